@@ -38,6 +38,9 @@ from .model.picture import (
 from .model.reactions import force_of_constraint, multiplier
 from .model.scene import Scene
 from .model.spline import Spline
+from .study.fit.experiment import Experiment
+from .study.fit.result import Fit
+from .study.fit.solve import fit
 from .study.sweep.sweep import sweep
 from .verification.check import Verification
 from .verification.result import Result
@@ -53,6 +56,8 @@ __all__ = [
     "Disk",
     "Embedding",
     "EquationsOfMotion",
+    "Experiment",
+    "Fit",
     "Friction",
     "Ground",
     "Holonomic",
@@ -79,6 +84,7 @@ __all__ = [
     "classify",
     "departure",
     "derive",
+    "fit",
     "force_of_constraint",
     "from_lagranges_method",
     "initial",

@@ -233,10 +233,14 @@ MEANT_WRONG = {  # each command with what cannot be meant
     "tradeoff": ("MODEL", "--method", "nothing"),
     "stress": ("MODEL", "--scene", "Nothing"),
     "sweep": ("MODEL", "--vary", "nothing=1,2"),
+    "fit": ("MODEL", "nothing.csv", "--free", "nothing"),
 }
+FITTED = ("measured.csv", "--free", "m")
 CANNOT_BE_READ = {  # and with a file that is not there, or is none
-    name: (("below/a/file",) if name == "new" else ("FILE", *(VARIED if name == "sweep" else ())))
-    for name in MEANT_WRONG
+    **{name: ("FILE",) for name in MEANT_WRONG},
+    "new": ("below/a/file",),
+    "sweep": ("FILE", *VARIED),
+    "fit": ("FILE", *FITTED),
 }
 
 

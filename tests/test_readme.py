@@ -47,8 +47,15 @@ COMMANDS = [
 ]
 BLOCKS = list(dict.fromkeys(re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL)))
 VARIED = ("parameters", "starts")
-TRIED_ELSEWHERE = ("fmpy", "libcosimpy", "ecospy", "SALib", "optuna")  # with FMUs, as printed
-LONG = ("tradeoff", "stress", "sweep", "page")  # studies: tried in tests of their own
+TRIED_ELSEWHERE = (
+    "lagfmu.fit",
+    "fmpy",
+    "libcosimpy",
+    "ecospy",
+    "SALib",
+    "optuna",
+)  # with FMUs, as printed
+LONG = ("tradeoff", "stress", "sweep", "fit", "page")  # studies: tried in tests of their own
 
 
 def quick(command: list[str]) -> bool:

@@ -280,7 +280,7 @@ def test_axes_are_crossed_in_the_order_in_which_they_are_given():
         (["--vary", "theta=1,2", "--keep", "lambda.surface:peak"], "time-of-max"),
         (["--vary", "theta=1,2", "--out", "runs.xls"], ".parquet, .csv, .nc, .zarr"),
         (["--vary", "xyz=1"], "expected one of m, g, a, r, der(r), theta, der(theta), solver."),
-        (["--vary", "theta=1,2", "--vary", "theta=3"], "theta varies in two ways"),
+        (["--vary", "theta=1,2", "--vary", "theta=3"], "theta is given twice"),
         ([], "nothing varies"),
         (["--vary", "theta=1,2", "--step-size", "0"], "step_size = 0.0"),
         (["--vary", "theta=1,2", "--workers", "0"], "workers = 0, expected a whole number from 1"),

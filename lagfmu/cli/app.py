@@ -9,6 +9,7 @@ import typer
 from ..fmu.archive import tool
 from ..verification.exit_codes import EXIT_CODES
 from .commands.build import build
+from .commands.fit import fit
 from .commands.new import new
 from .commands.page import page
 from .commands.reference import reference
@@ -20,7 +21,7 @@ from .commands.tradeoff import tradeoff
 from .commands.verify import verify
 from .terminal import prepare_streams
 
-COMMANDS = (build, new, show, verify, reference, simulate, page, tradeoff, stress, sweep)
+COMMANDS = (build, new, show, verify, reference, simulate, page, tradeoff, stress, sweep, fit)
 EPILOG = "Exit codes: " + "; ".join(f"{code} {text}" for code, text in EXIT_CODES.items()) + "."
 
 app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False, epilog=EPILOG)

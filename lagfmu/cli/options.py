@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import wraps
 from pathlib import Path
 from typing import Annotated, Any, get_type_hints
 
 import typer
 
-from ..errors import UnitError, UsageError
+from ..errors import SettingError, UnitError, UsageError
 from ..fmu.target import TARGETS
 from ..names import METHOD
 
@@ -179,3 +179,13 @@ def _quantity(text: str, value: str, unit: str | None) -> float:
         return parse_quantity(value, parse_unit(unit, text), f"--set {text!r}: value")
     except UnitError as error:
         raise UsageError(str(error)) from None
+
+
+def once(pairs: Iterable[tuple[str, Any]]) -> dict[str, Any]:
+    """What is given for each name.  Raises SettingError for one that is given twice."""
+    found: dict[str, Any] = {}
+    for name, value in pairs:
+        if name in found:
+            raise SettingError(f"{name} is given twice: {found[name]}, {value}")
+        found[name] = value
+    return found

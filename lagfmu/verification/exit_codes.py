@@ -7,7 +7,7 @@ from ..errors import LagfmuError, UsageError, UserInterruptError
 HOLDS, FAILS, WRONG_USAGE, NOT_RUN, INTERRUPTED, TERMINATED = 0, 1, 2, 3, 130, 143
 EXIT_CODES = {  # of every command
     HOLDS: "done; where something was judged, all of it holds",
-    FAILS: "a statement fails, or a probe is wrong",
+    FAILS: "a statement fails, a probe is wrong, or a fit does not converge",
     WRONG_USAGE: "wrong usage: an option, a name that is not known, a value that is not taken, a table that "
     "cannot be read",
     NOT_RUN: "a file cannot be read or written, a model cannot be built, an FMU cannot be run; the others "

@@ -75,8 +75,9 @@ def at(result: Trajectory, name: str, times: NDArray[np.float64]) -> NDArray[np.
     return np.asarray(column[np.clip(place, 0, len(column) - 1)], dtype=float)
 
 
-def read_table(path: Path) -> Trajectory:
-    """A CSV file with a column `time` [s].  Raises SettingError with what is wrong with it."""
+def read_table(path: Path, gaps: bool = False) -> Trajectory:
+    """A CSV file with a column `time` [s]; with `gaps` an empty cell is NaN.  Raises SettingError with what
+    is wrong with it."""
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
             head, *rows = [row for row in csv.reader(file, skipinitialspace=True) if row]
@@ -90,23 +91,34 @@ def read_table(path: Path) -> Trajectory:
     if twice := sorted({n for n in names if names.count(n) > 1}):
         raise SettingError(f"{str(path)!r}: {', '.join(twice)} stands in two columns")
     table = np.zeros(len(rows), dtype=[(n, float) for n in names])
+    bad: list[str] = []
     for k, row in enumerate(rows):
         try:
             for name, cell in zip(names, row, strict=True):
-                table[name][k] = float(TRUTH.get(cell.strip(), cell))
+                if gaps and not cell.strip():
+                    table[name][k] = np.nan
+                elif not np.isfinite(number := float(TRUTH.get(cell.strip(), cell))):
+                    bad.append(f"{name} in row {k + 1} is {cell.strip()!r}")
+                else:
+                    table[name][k] = number
         except ValueError:
             raise SettingError(
                 f"{str(path)!r} is no table of numbers: row {k + 1} is {','.join(row)!r}"
             ) from None
+    if bad:
+        more = f", and {len(bad) - 5} more" if len(bad) > 5 else ""
+        raise SettingError(
+            f"{str(path)!r}: {', '.join(bad[:5])}{more}: expected finite numbers"
+            + (", or empty cells" if gaps else "")
+        )
+    if not rows:
+        raise SettingError(f"{str(path)!r} has no rows")
+    if gaps:
+        return table  # what its columns are is not yet known
     if "time" not in names:
         raise SettingError(
             f"{str(path)!r}: there is no column 'time', found {', '.join(names) or 'nothing'}"
         )
-    if not rows:
-        raise SettingError(f"{str(path)!r} has no rows")
-    bad = [n for n in names if not np.isfinite(table[n]).all()]
-    if bad:
-        raise SettingError(f"{str(path)!r}: {', '.join(bad)} holds what is no finite number")
     if not (np.diff(table["time"]) >= 0).all():
         raise SettingError(f"{str(path)!r}: the times are not sorted, expected rising seconds")
     return table

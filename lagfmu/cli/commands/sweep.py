@@ -5,14 +5,13 @@ from __future__ import annotations
 import os
 import shlex
 import sys
-from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
 from ...errors import SettingError
-from ..options import InputFile, StepSize, StopTime, Tolerance
+from ..options import InputFile, StepSize, StopTime, Tolerance, once
 from ..terminal import plainly, say_wrote
 
 
@@ -91,7 +90,7 @@ def sweep(
     from ..swept import print_sweep
 
     with plainly():
-        axes, laws = _once(map(axis, vary or ())), _once(map(distribution, sample or ()))
+        axes, laws = once(map(axis, vary or ())), once(map(distribution, sample or ()))
         if figure is not None and figure.suffix not in FIGURES:
             raise SettingError(f"--plot {str(figure)!r}: expected a file {', '.join(FIGURES)}")
         table = None
@@ -126,13 +125,3 @@ def sweep(
             say_wrote(out)
         if figure is not None:
             say_wrote(plot(found, figure))
-
-
-def _once(pairs: Iterator[tuple[str, Any]]) -> Mapping[str, Any]:
-    """What is given for each name.  Raises SettingError."""
-    found: dict[str, Any] = {}
-    for name, value in pairs:
-        if name in found:
-            raise SettingError(f"{name} varies in two ways")
-        found[name] = value
-    return found

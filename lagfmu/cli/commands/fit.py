@@ -1,0 +1,99 @@
+"""`lagfmu fit`: the values with which an FMU explains what was measured."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..options import JsonFile, Settings, StepSize, assignments, once
+from ..terminal import console, plainly, say, say_wrote
+
+
+def fit(
+    target: Annotated[Path, typer.Argument(help="An FMU, or a model file.")],
+    measured: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="MEASURED.csv...",
+            help="Tables with a column time and one for each measured output, input and parameter of the "
+            "experiment; 'force.A.x [kN]' has a unit of its own, empty cells are gaps.",
+        ),
+    ],
+    free: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME[=LOW:HIGH[:START]]",
+            help="A parameter or start value to be found; repeatable.",
+        ),
+    ] = None,
+    measure: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="OUTPUT[:DEVIATION]",
+            help="An output that was measured, and its standard deviation (else it is estimated); repeatable "
+            "(default: every column that is an output).",
+        ),
+    ] = None,
+    offset: Annotated[
+        float, typer.Option(help="The clocks may be wrong by up to this many s, and are set right.")
+    ] = 0.0,
+    loss: Annotated[
+        str, typer.Option(help="linear; soft_l1, huber, cauchy, arctan against outliers.")
+    ] = "linear",
+    set_: Settings = None,
+    tolerance: Annotated[
+        float | None, typer.Option(help="Relative tolerance of the runs (default 1e-9).")
+    ] = None,
+    step_size: StepSize = None,
+    scene: Annotated[
+        str | None, typer.Option(help="Which FMU of a model file (default: its first).")
+    ] = None,
+    json: JsonFile = None,
+    figure: Annotated[
+        Path | None, typer.Option("--plot", help="Write a figure: .svg, .png or .pdf.")
+    ] = None,
+) -> None:
+    """Find the values of parameters and start values that explain what was measured.
+
+    Exit code 1 if the search does not converge.
+    """
+    from ...fmu.read import read_description, units_of
+    from ...fmu.write import as_fmu, write_whole
+    from ...page.table import new_table, print_whole
+    from ...study.fit.problem import free_of, measure_of
+    from ...study.fit.solve import TOLERANCE
+    from ...study.fit.solve import fit as found_by
+    from ...verification.exit_codes import FAILS
+    from ...verification.junit import text_of
+
+    with plainly(), as_fmu(target, scene) as fmu:
+        units = units_of(read_description(fmu).modelVariables)
+        found = found_by(
+            fmu,
+            [str(p) for p in measured],
+            once(free_of(text, units) for text in free or ()),
+            once(measure_of(text, units) for text in measure or ()),
+            start_values=assignments(set_, lambda: units),
+            offset=offset,
+            loss=loss,
+            tolerance=TOLERANCE if tolerance is None else tolerance,
+            step_size=step_size,
+        )
+        say(found.summary())
+        table = new_table(
+            "", "value", "found", "standard error", "95 % interval", "unit", text=["value", "unit"]
+        )
+        for row in found.rows():
+            table.add_row(*row)
+        print_whole(console, table)
+        for text in found.remarks():
+            say(text, "note:", "yellow")
+        if json is not None:
+            write_whole(json, text_of(found.to_dict()).encode())
+            say_wrote(json)
+        if figure is not None:
+            say_wrote(found.plot(figure))
+        if not found.converged:
+            raise typer.Exit(FAILS)

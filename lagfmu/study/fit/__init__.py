@@ -1,0 +1,1 @@
+"""Which values of parameters explain what was measured."""

@@ -1,0 +1,184 @@
+"""What a fit asks: which values are free, which outputs were measured and how well, in which experiments.
+
+mu                         free, from its described value, within the variable's bounds
+mu=0.05:0.9                within these bounds; mu=0.05:0.9:0.3 from 0.3
+lambda.rod:0.1             measured, with a standard deviation of 0.1 in its unit
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...errors import SettingError, UnitError
+from ...interface.rules import problems_of, unsettable
+from ...model.rule import Rule, missing
+from ...model.units import parse_quantity, parse_unit
+from .experiment import Experiment, Series, series_of
+
+OFFSET = "offset."  # begins the name of the unknown offset in time of an experiment
+LOSSES = ("linear", "soft_l1", "huber", "cauchy", "arctan")  # SciPy's
+
+
+@dataclass(frozen=True)
+class Free:
+    """A value that is sought, in SI units; `of`: the experiment whose clock it sets right, if it is none of
+    the FMU's."""
+
+    name: str
+    start: float
+    low: float = -math.inf
+    high: float = math.inf
+    unit: str = ""
+    of: str = ""
+
+    def scale(self, value: float) -> float:
+        """A magnitude of it: that of the value, or of the bounds where it starts from 0."""
+        if self.start:
+            return abs(value) or abs(self.start)
+        return self.high - self.low if math.isfinite(self.high - self.low) else 1.0
+
+
+@dataclass(frozen=True)
+class Problem:
+    """`free` values, and `deviations`: of each measured output the standard deviation, None where it is
+    unknown and estimated from the residuals."""
+
+    free: tuple[Free, ...]
+    deviations: Mapping[str, float | None]
+    series: tuple[Series, ...]
+    units: Mapping[str, str]
+
+    @property
+    def points(self) -> int:
+        """How many numbers were measured."""
+        return sum(int(np.isfinite(c).sum()) for s in self.series for c in s.measured.values())
+
+
+def free_of(text: str, units: Mapping[str, str | None]) -> tuple[str, Any]:
+    """NAME, NAME=LOW:HIGH or NAME=LOW:HIGH:START as a name and None or a tuple.  Raises SettingError."""
+    name, sign, given = (part.strip() for part in text.partition("="))
+    if not sign:
+        return name, None
+    parts = given.split(":")
+    if len(parts) not in (2, 3):
+        raise SettingError(f"--free {text!r}: expected NAME, NAME=LOW:HIGH or NAME=LOW:HIGH:START")
+    return name, tuple(_number(part, units.get(name), f"--free {text!r}") for part in parts)
+
+
+def measure_of(text: str, units: Mapping[str, str | None]) -> tuple[str, float | None]:
+    """OUTPUT or OUTPUT:DEVIATION as a name and a number.  Raises SettingError."""
+    name, sign, given = (part.strip() for part in text.rpartition(":"))
+    if not sign:
+        return given, None
+    return name, _number(given, units.get(name), f"--measure {text!r}")
+
+
+def _number(text: str, unit: str | None, what: str) -> float:
+    try:
+        return parse_quantity(text, parse_unit(unit or "1", what), what)
+    except UnitError as error:
+        raise SettingError(str(error)) from None
+
+
+def problem_of(
+    variables: Sequence[Any],
+    rules: Mapping[str, Rule],
+    experiments: Sequence[Experiment],
+    free: Mapping[str, Any],
+    measure: Mapping[str, float | None],
+    values: Mapping[str, Any],
+    offset: float,
+) -> Problem:
+    """All of it checked against an FMU.  Raises SettingError with every problem."""
+    units = {v.name: v.unit for v in variables}
+    known = _uses(variables, rules)
+    problems = problems_of(rules, values)
+    problems += [
+        missing(n, [k for k, use in known.items() if use == "output"], "is no output")
+        for n in measure
+        if known.get(n) != "output"
+    ]
+    for name, sd in measure.items():
+        if sd is not None and not 0 < sd < math.inf:
+            problems.append(f"{name!r}: a standard deviation of {sd!r}, expected a positive number")
+    if not 0 <= offset < math.inf:
+        problems.append(f"offset = {offset!r} s, expected the largest one, from 0")
+    if not (free or offset):
+        problems.append("nothing is free: name what shall be found, e.g. mu=0.05:0.9")
+    sought = [_free(n, bounds, rules, units, values, problems) for n, bounds in free.items()]
+    names = [e.name for e in experiments]
+    if twice := sorted({n for n in names if names.count(n) > 1}):
+        problems.append(f"several experiments are called {', '.join(map(repr, twice))}")
+    wanted = [n for n in measure if known.get(n) == "output"]
+    series = []
+    for e in experiments:
+        one = series_of(e, known, units, wanted, offset, problems)
+        series += [] if one is None else [one]
+    for one in series:
+        problems += [f"{one.name}: {text}" for text in problems_of(rules, one.values)]
+        problems += [f"{one.name}: {n!r} is set and free" for n in one.values if n in free]
+    if problems:
+        raise SettingError("; ".join(problems))
+    if offset:
+        sought += [Free(OFFSET + s.name, 0.0, -offset, offset, "s", s.name) for s in series]
+    outputs = dict.fromkeys(n for s in series for n in s.measured)
+    made = Problem(
+        tuple(f for f in sought if f is not None),
+        {n: measure.get(n) for n in outputs},
+        tuple(series),
+        {n: u or "1" for n, u in units.items()},
+    )
+    if made.points < len(made.free):
+        raise SettingError(f"{made.points} measured numbers for {len(made.free)} unknowns")
+    return made
+
+
+def _uses(variables: Sequence[Any], rules: Mapping[str, Rule]) -> dict[str, str]:
+    """What a column of this name is for: output, input or parameter (what can be set besides)."""
+    plain = {"output": "output", "input": "input"}
+    return {
+        v.name: plain.get(v.causality, "parameter")
+        for v in variables
+        if v.causality in plain or rules[v.name].settable
+    }
+
+
+def _free(
+    name: str,
+    bounds: Any,
+    rules: Mapping[str, Rule],
+    units: Mapping[str, str | None],
+    values: Mapping[str, Any],
+    problems: list[str],
+) -> Free | None:
+    """One of those that are sought; `bounds`: None, (low, high) or (low, high, start)."""
+    if text := unsettable(rules, name):
+        problems.append(text)
+        return None
+    rule = rules[name]
+    if rule.kind != "Real":
+        problems.append(f"{name!r} is a {rule.kind}, expected what changes continuously")
+        return None
+    given = () if bounds is None else tuple(float(x) for x in bounds)
+    if len(given) not in (0, 2, 3) or not all(map(math.isfinite, given)):
+        problems.append(f"{name!r}: bounds {bounds!r}, expected (low, high) or (low, high, start)")
+        return None
+    low, high = given[:2] or (
+        -math.inf if rule.minimum is None else rule.minimum,
+        math.inf if rule.maximum is None else rule.maximum,
+    )
+    start = given[2] if len(given) == 3 else float(values.get(name, rule.start or 0.0))
+    if not low < high:
+        problems.append(f"{name!r}: bounds {low!r} and {high!r}, expected the smaller one first")
+    elif not low <= start <= high:
+        problems.append(
+            f"{name!r}: the start {start!r} lies outside the bounds {low!r} and {high!r}: give one between "
+            "them, NAME=LOW:HIGH:START"
+        )
+    problems += [text for x in given if (text := rule.problem(x)) and text not in problems]
+    return Free(name, start, low, high, units.get(name) or "1")

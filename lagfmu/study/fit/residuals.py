@@ -1,0 +1,112 @@
+"""How far runs are from what was measured, and how that changes with what is free."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import SimulationError
+from ...fmu.inputs import columns_at, jumps
+from ...fmu.read import communication_points
+from ...fmu.session import RefusalError, Session
+from .experiment import Series
+from .problem import Problem
+
+Floats = NDArray[np.float64]
+
+
+class Residuals:
+    """Runs of one FMU: of values x of what is free, the numbers that were measured as the FMU has them.
+
+    `given`: what is set besides; `step` [s]: of inputs, which an FMU gets as straight pieces; `difference`:
+    the part of its magnitude by which a free value is changed to find derivatives (central differences);
+    `runs`: how many there were.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        session: Session,
+        tolerance: float,
+        step: float,
+        given: Mapping[str, Any],
+    ) -> None:
+        self.problem, self.session, self.given = problem, session, given
+        self.tolerance, self.step = tolerance, step
+        self.difference = tolerance ** (1 / 3)
+        self.runs = 0
+        self.measured = np.concatenate(
+            [c[np.isfinite(c)] for s in problem.series for c in s.measured.values()]
+        )
+        self.of = np.concatenate(  # the name of the output of each number
+            [[n] * int(np.isfinite(c).sum()) for s in problem.series for n, c in s.measured.items()]
+        )
+
+    def at(self, x: Sequence[float] | Floats) -> Floats:
+        """The numbers (points,) of the FMU.  Raises RefusalError where a run ends early."""
+        found = []
+        for one in self.problem.series:
+            rows = self._run(one, x)
+            found += [rows[n][np.isfinite(c)].astype(float) for n, c in one.measured.items()]
+        return np.concatenate(found)
+
+    def jacobian(self, x: Floats, weights: Floats) -> Floats:
+        """The derivatives (points, free), times `weights`, by central differences, one-sided at a bound or
+        beside a run that ends early; what these do not tell from 0 is 0, so that a search leaves it alone.
+         Raises SimulationError where there is a run on neither side."""
+        columns = []
+        for k, f in enumerate(self.problem.free):
+            h = self.difference * max(abs(x[k]), 1e-3 * f.scale(x[k]))
+            sides = []
+            for value in (max(x[k] - h, f.low), min(x[k] + h, f.high)):
+                moved = np.array(x)
+                moved[k] = value
+                try:
+                    sides.append((value, self.at(moved)))
+                except RefusalError as error:
+                    refusal = error
+            if len(sides) == 1:
+                sides.append((x[k], self.at(x)))
+            if len(sides) < 2 or sides[0][0] == sides[1][0]:
+                raise SimulationError(
+                    f"the run at {f.name} = {x[k]!r} has no neighbours: {refusal.message}"
+                )
+            columns.append((sides[1][1] - sides[0][1]) / (sides[1][0] - sides[0][0]))
+        found = np.column_stack(columns) * weights[:, None]
+        scale = np.array([f.scale(v) for f, v in zip(self.problem.free, x, strict=True)])
+        left, size, right = np.linalg.svd(found * scale, full_matrices=False)
+        size[size < self.noise * size[0]] = 0.0
+        kept = (left * size) @ right
+        kept[:, np.linalg.norm(kept, axis=0) < self.noise * size[0]] = 0.0
+        return np.asarray(kept / scale)
+
+    @property
+    def noise(self) -> float:
+        """The part of the largest singular value of a Jacobian that differences do not tell from 0."""
+        return float(10 * self.difference**2)
+
+    def _run(self, one: Series, x: Sequence[float] | Floats) -> Any:
+        """The rows at the times of one experiment."""
+        own = dict(zip(self.problem.free, x, strict=True))
+        values = dict(self.given) | dict(one.values)
+        values |= {f.name: float(v) for f, v in own.items() if not f.of}
+        shift = sum(float(v) for f, v in own.items() if f.of == one.name)
+        wanted = one.time - shift
+        times = np.unique(np.concatenate([[0.0], wanted]))
+        drive: Mapping[str, Sequence[float]] = {}
+        if one.inputs is not None:
+            times = np.union1d(times, communication_points(float(times[-1]), self.step))
+            times = np.union1d(times, jumps(one.inputs, times))
+            drive = columns_at(one.inputs, times + shift, self.session.rules)
+        if len(times) == 1:
+            times = np.array([0.0, self.step])
+        self.runs += 1
+        run = self.session.run(
+            times.tolist(), values, self.tolerance, list(one.measured), drive, late=True
+        )
+        if run.refusal is not None:
+            raise run.refusal
+        return run.rows[np.searchsorted(times, wanted)]
