@@ -237,7 +237,7 @@ MEANT_WRONG = {  # each command with what cannot be meant
 }
 FITTED = ("measured.csv", "--free", "m")
 CANNOT_BE_READ = {  # and with a file that is not there, or is none
-    **{name: ("FILE",) for name in MEANT_WRONG},
+    **dict.fromkeys(MEANT_WRONG, ("FILE",)),
     "new": ("below/a/file",),
     "sweep": ("FILE", *VARIED),
     "fit": ("FILE", *FITTED),
