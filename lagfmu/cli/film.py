@@ -16,10 +16,11 @@ import numpy as np
 from ..errors import BuildError, UsageError
 from ..fmu.read import Trajectory
 from ..fmu.write import write_whole
-from ..live.moving import FORCE, INK, Moving, View
+from ..live.moving import FORCE, INK, View
 from ..live.playable import Told
 from ..live.recording import recorded
 from ..live.render import render
+from ..live.stage import Stage
 
 RATE, MOST = 25, 300  # frames per second, and of a film
 ENDINGS = (".gif", ".mp4", ".html", ".webp")
@@ -75,19 +76,8 @@ def _draw(
     rate, most = (RATE, MOST) if title else (SMALL_RATE, SMALL_MOST)
     count = int(min(max(np.ceil(end * rate), 2), most))
     times = np.linspace(0.0, end, count + 1)
-
-    def look(name: str) -> Any:
-        if name == "time":
-            return times
-        if name in (run.dtype.names or ()):
-            return np.interp(times, run["time"], run[name].astype(float))
-        return known.get(name, np.nan)
-
-    shapes = [Moving(s, look, len(times)) for s in picture["shapes"] if s["kind"] != "direction"]
-    solids = [s for s in shapes if s.facets]
-    others = [s for s in shapes if not s.facets]
-    view = View(shapes, labels=bool(title))
-    figure, axes, marks = _panels(view, run, curve, bool(title))
+    stage = Stage(picture, run, known, times, labels=bool(title))
+    figure, axes, marks = _panels(stage.view, run, curve, bool(title))
     FigureCanvasAgg(figure)
     speed = end * rate / count
     note = "" if abs(speed - 1) < 0.05 or not title else f", {speed:.3g} times as fast"
@@ -100,15 +90,11 @@ def _draw(
             frames.saving(figure, str(out), dpi=100),
         ):
             for k, t in enumerate(times):
-                view.set(axes, np.concatenate([s.covers(k) for s in shapes]))
-                for shape in (*sorted(solids, key=lambda s: s.depth(k)), *others):
-                    shape.draw(axes, k, view)
-                if picture["dimensions"] == 3:
-                    view.axes_of_space(axes, shapes[0].seen)
+                stage.draw(axes, k)
                 if title:
                     head.set_text(f"{title}, t = {t:.2f} s{note}")
                 if curve is not None and marks is not None:
-                    value = float(look(curve["name"])[k])
+                    value = float(stage.look(curve["name"])[k])
                     marks[0].set_data([t], [value])
                     marks[1].set_text(f"{curve['name']} = {value:.4g} {curve['unit']}")
                 frames.grab_frame()
