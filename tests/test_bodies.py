@@ -9,10 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import sympy
 from sympy import symbols
 from sympy.physics.vector import dynamicsymbols
 
-from lagfmu import Parameter, Scene, simulate, verify
+from lagfmu import Parameter, Scene, Spline, Track, simulate, verify
 from lagfmu.bodies import (
     Body,
     Contact,
@@ -23,6 +24,7 @@ from lagfmu.bodies import (
     Gravity,
     Ground,
     Motor,
+    PointOnCurve,
     PointOnPlane,
     Prismatic,
     Revolute,
@@ -37,6 +39,7 @@ from lagfmu.testing import load, prepare, typeset, write
 
 g = 9.81  # m/s^2
 t = dynamicsymbols._t
+turn = symbols("turn")  # along a curve
 ground = Ground()
 MODELS = Path(__file__).parent.parent / "models"
 
@@ -391,6 +394,45 @@ def test_a_parameter_that_two_parts_share_is_one():
     assert (x - 0.25 * sin(angle), y + 0.25 * cos(angle)) == pytest.approx((0, 0.25), abs=1e-13)
 
 
+def test_a_bead_on_a_circle_is_a_pendulum():
+    """R s'' = -g cos(s) with s from the horizontal, and the circle pushes with m (R s'^2 - g sin(s)) towards
+    the centre: on a frame that is turned by 0.3, in both targets."""
+    bead, R = Body("bead", 2.0, 0.01), 0.5
+    circle = Track((R * sympy.cos(turn), R * sympy.sin(turn)), turn, -4, 4)
+    joint = PointOnCurve("K", ground.at((0, 0), rotation=0.3), bead.at((0, 0)), circle)
+    loads = [Gravity((0, -g))]
+    model = plane(bodies=[bead], joints=[joint], loads=loads, start={"K.curve.s": -0.2})
+    for target in ("native", "python"):
+        run = moved(model, target=target)
+        s, rate = run["K.curve.s"] + 0.3, run["der(K.curve.s)"]
+        np.testing.assert_allclose(
+            run["der(K.curve.s,2)"], -g * np.cos(s) / R, rtol=1e-9, atol=1e-9
+        )
+        push = -2.0 * (R * rate**2 - g * np.sin(s))  # along c, from the centre
+        np.testing.assert_allclose(run["force.K.x"], push * np.cos(s - 0.3), atol=1e-9)
+        np.testing.assert_allclose(run["force.K.y"], push * np.sin(s - 0.3), atol=1e-9)
+        np.testing.assert_allclose(run["energy.total"], run["energy.total"][0], atol=1e-9)
+
+
+def test_a_bead_on_a_parabola_and_on_a_table_is_carried_by_what_is_across():
+    """At rest on y = x^2/(2 p) it feels m g/sqrt(1 + (x/p)^2); on a table it keeps its energy and stays on
+    the spline, having begun where only x was given."""
+    bead, p = Body("bead", 1.5, 0.01), Parameter(symbols("p", positive=True), 0.4, "m")
+    at = ground.at((0, 0)), bead.at((0, 0))
+    parabola = Track((turn, turn**2 / (2 * p.symbol)), turn, -1, 1)
+    given = {"bodies": [bead], "loads": [Gravity((0, -g))], "start": {"bead.position.x": 0.2}}
+    joint = PointOnCurve("K", *at, parabola, unit="m")
+    first = moved(plane(joints=[joint], parameters=[p], **given), stop=0.01)[0]
+    assert first["force.K.norm"] == pytest.approx(1.5 * g / sqrt(1 + 0.5**2), rel=1e-13)
+    road = Spline("road", [0, 0.3, 0.7, 1.0], [0.1, 0, 0.05, 0.2], "m", "m")
+    run = moved(plane(joints=[PointOnCurve("K", *at, road)], **given))
+    assert run["bead.position.x"][0] == 0.2
+    np.testing.assert_allclose(run["K.curve.s"], run["bead.position.x"], atol=1e-14)
+    height = [road.table(x, 0) for x in run["bead.position.x"].tolist()]
+    np.testing.assert_allclose(run["bead.position.y"], height, atol=1e-14)
+    np.testing.assert_allclose(run["energy.total"], run["energy.total"][0], atol=1e-9)
+
+
 def test_a_mechanism_is_assembled_from_the_joint_coordinates_that_are_given():
     """A four-bar linkage, drawn as one line: the crank's angle and rate stay, the rest closes, velocities
     too; the angle between coupler and rocker is that of the cosine law.  The elbow may bend the other way as
@@ -547,6 +589,18 @@ pin = Revolute("A", ground.at((0, 0)), arm.at((0, 0)))
         ),
         ({"joints": [pin, Gear("G", "A", "A", 2.0)]}, "Gear 'G' ties 'A' to itself"),
         ({"plane": "yz"}, "plane = 'yz', expected 'xy'"),
+        (
+            {"joints": [PointOnCurve("K", ground.at((0, 0)), arm.at((0, 0)), (turn, turn))]},
+            "PointOnCurve 'K': its curve is (turn, turn), expected a Track",
+        ),
+        (
+            {
+                "joints": [
+                    PointOnCurve("K", ground.at((0, 0)), arm.at((0, 0)), Track((turn,), turn, 0, 1))
+                ]
+            },
+            "its curve has 1 components, expected 2",
+        ),
         ({"read": {"tip": pin}}, "Reading 'tip': at is Revolute("),
         ({"read": {"tip": ground.at((0, 0))}}, "'tip': its marker is on the ground"),
         ({"read": {"arm": arm}}, "'arm' is used twice, by a Body and a Reading"),

@@ -8,8 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
+from sympy import Symbol, cos, sin
 
-from lagfmu import simulate
+from lagfmu import Track, simulate
 from lagfmu.bodies import (
     Body,
     Cylindrical,
@@ -20,6 +22,7 @@ from lagfmu.bodies import (
     Ground,
     Motor,
     Planar,
+    PointOnCurve,
     PointOnPlane,
     Prismatic,
     Revolute,
@@ -31,6 +34,7 @@ from lagfmu.errors import ModelError
 from lagfmu.testing import load
 
 g = 9.81  # m/s^2
+s = Symbol("s")
 FALL = (0.3, -0.5, -g)
 ground = Ground()
 MODELS = Path(__file__).parent.parent / "models"
@@ -45,6 +49,11 @@ KINDS = [
     ),
     pytest.param(
         lambda name, a, b: Distance(name, a, b, 0.6), id="Distance", marks=pytest.mark.thorough
+    ),
+    pytest.param(
+        lambda name, a, b: PointOnCurve(name, a, b, Track((s, s**2, s**3), s, -1, 1)),
+        id="PointOnCurve",
+        marks=pytest.mark.thorough,
     ),
 ]
 
@@ -252,6 +261,36 @@ def test_a_rough_sleeve_is_braked_against_the_way_of_its_surface():
     np.testing.assert_allclose(run["force.A.z"], -mu * N * v / speed, atol=1e-12)
     np.testing.assert_allclose(run["torque.A.z"], -r * mu * N * surface / speed, atol=1e-12)
     assert run["angle.A"][-1] > pi  # it goes on over turns, as the start names it
+
+
+def test_a_bead_on_a_rough_helix_rubs_with_the_norm_of_what_is_across_it():
+    """c = (R cos s, R sin s, h s), sliding down: v' = g sin a - mu N/m with N/m = |(g cos a, k v^2)|, since
+    gravity across the curve is square to its curvature k = R/(R^2 + h^2)."""
+    R, h, mu, m = 0.5, 0.4, 0.3, 2.0
+    bead = Body("bead", m, (0.01, 0.01, 0.01))
+    helix = Track((R * cos(s), R * sin(s), -h * s), s, -10, 10)
+    model = mechanism(
+        "Helix",
+        bodies=[bead],
+        joints=[PointOnCurve("K", ground.at((0, 0, 0)), bead.at((0, 0, 0)), helix, friction=mu)],
+        loads=[Gravity((0, 0, -g))],
+        start={"K.curve.s": 1.0, "der(K.curve.s)": 2.0},
+    )
+    run = simulate(model, 1.0, 0.1, tolerance=1e-11)
+    way = np.hypot(R, h)  # of one radian
+
+    def across(v):
+        return np.hypot(g * R / way, R / way**2 * v**2)
+
+    def rates(_, y):
+        return [y[1], g * h / way - mu * across(y[1])]
+
+    at = {"t_eval": run["time"], "rtol": 1e-12, "atol": 1e-13}
+    length, v = solve_ivp(rates, (0, 1), [way, 2 * way], **at).y
+    np.testing.assert_allclose(run["K.curve.s"] * way, length, rtol=1e-9)
+    np.testing.assert_allclose(run["der(K.curve.s)"] * way, v, rtol=1e-9)
+    normal, rubs = m * across(v), m * mu * across(v)
+    np.testing.assert_allclose(run["force.K.norm"][1:], np.hypot(normal, rubs)[1:], rtol=1e-9)
 
 
 def test_a_gear_in_space_counts_turns():

@@ -2,6 +2,7 @@
 
 from .body import Body, Ground
 from .contacts import Contact
+from .curves import PointOnCurve
 from .joints import (
     Cylindrical,
     Distance,
@@ -31,6 +32,7 @@ __all__ = [
     "Ground",
     "Motor",
     "Planar",
+    "PointOnCurve",
     "PointOnPlane",
     "Prismatic",
     "Revolute",

@@ -29,6 +29,7 @@ from .rows import TIME, Array, Rows, condition, numbers_of
 
 STEPS, HALVINGS = 100, 12
 TRIES = 12  # beginnings with other omitted values, where the first leads nowhere
+LIGHT = 1e-6  # what resists a parameter of a curve, which has no mass, of that of the body
 REDUNDANT = 1e-11  # a singular value, relative to the largest: rows that say the same
 EPS = float(np.finfo(float).eps)
 
@@ -111,7 +112,7 @@ class _Moving:
             d: m
             for b in draft.motions.values()
             for d, m in zip(b.directions, b.masses, strict=True)
-        }
+        } | {s: LIGHT * of.mass for s, of in draft.curves.items()}
         self.weight = np.sqrt(numbers_of(model, [masses[d] for d in model.directions]))
         self.lengths = np.array([model.coordinates.get(d) == "m" for d in model.directions])
         self.scale = np.ones(len(self.lengths))  # what is much of each speed, in a second

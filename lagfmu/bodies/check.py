@@ -8,10 +8,12 @@ from typing import Any
 import numpy as np
 
 from ..model.elements import NAME, Parameter, is_number
-from ..model.picture import Box, points_of
+from ..model.picture import Box, Track, points_of
+from ..model.spline import Spline
 from ..names import RESERVED
 from .body import Body, Ground, Marker
 from .contacts import Contact
+from .curves import PointOnCurve
 from .joints import Distance, Gear, Joint, Rolling, Universal, name_of_joint
 from .loads import Force, Gravity, Motor, SpringDamper, Torque, Torsion
 from .picture import CARRIED, shapes_of
@@ -20,7 +22,7 @@ from .rotation import problem_of
 from .space import PAIRS
 from .vectors import AXES
 
-PARTS = (Joint, Distance, Rolling, Gear, Contact)
+PARTS = (Joint, Distance, PointOnCurve, Rolling, Gear, Contact)
 PARTS += (Gravity, SpringDamper, Torsion, Force, Torque, Motor)  # type: ignore[assignment]
 PLANES = (None, "xy")
 
@@ -50,6 +52,12 @@ def problems_of(plane: object, bodies: Sequence[Any], parts: Sequence[Any]) -> l
             for part in parts
             if isinstance(part, Joint)
             for p in _of_joint(part, plane is not None)
+        ),
+        *(
+            p
+            for part in parts
+            if isinstance(part, PointOnCurve)
+            for p in _of_curve(part, plane is not None)
         ),
         *(problem for part in parts for problem in _of_references(part, parts)),
     ]
@@ -204,6 +212,17 @@ def _of_joint(joint: Joint, planar: bool) -> Iterator[str]:
         yield f"{what}: limits are {limits!r}, expected the smallest and the largest value"
     elif all(map(is_number, limits)) and not float(limits[0]) < float(limits[1]):  # type: ignore[arg-type]
         yield f"{what}: limits are {limits!r}, expected the smaller value first: exchange them"
+
+
+def _of_curve(part: PointOnCurve, planar: bool) -> Iterator[str]:
+    what, count = f"PointOnCurve {part.name!r}", 2 if planar else len(AXES)
+    if not isinstance(part.curve, Track | Spline):
+        yield (
+            f"{what}: its curve is {part.curve!r}, expected a Track((x, y), s, first, last) of lagfmu, or in "
+            "the plane a Spline"
+        )
+    elif len(part.along()[0]) != count:
+        yield f"{what}: its curve has {len(part.along()[0])} components, expected {count}"
 
 
 def _of_references(part: Any, parts: Sequence[Any]) -> Iterator[str]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import sympy as sp
 from sympy.physics.vector import dynamicsymbols
@@ -62,6 +62,14 @@ class Relative:
             draft.turn(self.first.body, times(-1, e))
 
 
+class Curve(NamedTuple):
+    """The coordinate of a point on a curve: its unit, what moves along [kg], and what it is."""
+
+    unit: str
+    mass: Expr
+    text: str
+
+
 class Draft:
     """All that a Model needs, in the order in which it is added; `problems` is what is wrong."""
 
@@ -81,6 +89,7 @@ class Draft:
         self.wound: set[str] = set()  # angles that something needs over many turns
         self.unwrapped: dict[Expr, tuple[Expr, Expr]] = {}  # in space: rate, and value modulo 2 pi
         self.placed: dict[Marker, Placed] = {}
+        self.curves: dict[Expr, Curve] = {}  # by the coordinate K.curve.s
         self.readings: dict[str, Placed] = {}  # markers that are read on request, by name
 
     # ------------------------------------------------------------------ numbers

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
+from ..model.elements import name_of
 from ..model.model import Model
 from .body import Ground, Marker
 from .draft import Draft
@@ -91,6 +92,15 @@ class Guess:
             pose = Pose(pose.axes, at.origin + reach - frame.origin, pose.angle)
         self.known[free.body] = self._put(free.body, pose)
 
+    def nearest(self, curved: Any) -> float:
+        """The value of a curve's parameter at which it is nearest to where the second marker is."""
+        first, second = (
+            self.known[m.body].then(self.local[m]) for m in (curved.first, curved.second)
+        )
+        values, points = curved.tried(self)
+        away = points - first.axes.T @ (second.origin - first.origin)
+        return float(values[np.argmin(np.linalg.norm(away, axis=1))])
+
     def _put(self, body: Any, pose: Pose) -> Pose:
         """With the components of the position that are given."""
         names = [f"{body.name}.position.{x}" for x in "xyz"]
@@ -137,8 +147,10 @@ class Reach:
 
 
 def guessed(draft: Draft, model: Model, ties: Sequence[Any], given: Mapping[str, float]) -> Array:
-    """The coordinates of the bodies, in the order of the model; angles that go on over turns follow at 0."""
-    found = Guess(draft, model, given).poses([t for t in ties if hasattr(t, "relative_pose")])
+    """The coordinates of the bodies, in the order of the model, then those of points on curves; angles that
+    go on over turns follow at 0."""
+    guess = Guess(draft, model, given)
+    found = guess.poses([t for t in ties if hasattr(t, "relative_pose")])
     values: list[float] = []
     for body in draft.motions:
         if isinstance(body, Ground):
@@ -148,4 +160,6 @@ def guessed(draft: Draft, model: Model, ties: Sequence[Any], given: Mapping[str,
             values += [*pose.origin[:2].tolist(), pose.angle]
         else:
             values += [*pose.origin.tolist(), *quaternion(pose.axes).tolist()]
+    curved = {f"{t.name}.curve.s": t for t in ties if hasattr(t, "tried")}
+    values += [given.get(n, guess.nearest(curved[n])) for n in map(name_of, draft.curves)]
     return np.array([*values, *([0.0] * (len(model.coordinates) - len(values)))])

@@ -72,12 +72,16 @@ def mechanism(
         {s: x for m in draft.motions.values() for s, x in getattr(m, field).items()}
         for field in ("coordinates", "descriptions", "speeds", "kinematics")
     )
-    angles = draft.unwrapped
+    angles, curves = draft.unwrapped, draft.curves
     model = Model(
         name=name,
         lagrangian=sp.Add(*draft.kinetic, *(-V for V in draft.potential)),
         forces={q: Q for q, Q in draft.forces.items() if Q != 0},
-        coordinates={**coordinates, **dict.fromkeys(angles, "rad")},
+        coordinates={
+            **coordinates,
+            **{s: of.unit for s, of in curves.items()},
+            **dict.fromkeys(angles, "rad"),
+        },
         speeds=speeds,
         kinematics={**kinematics, **{q: rate for q, (rate, _) in angles.items()}},
         unwrapped={q: within for q, (_, within) in angles.items()},
@@ -85,7 +89,7 @@ def mechanism(
         parameters=[*draft.parameters.values(), *parameters],
         inputs=[*draft.inputs, *inputs],
         outputs=[*draft.outputs, *outputs],
-        descriptions=descriptions,
+        descriptions={**descriptions, **{s: of.text for s, of in curves.items()}},
         parts=lines_of(bodies, parts),
         **{"picture": picture_of(draft, parts), **more},
     )
