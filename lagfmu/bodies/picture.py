@@ -12,14 +12,27 @@ import sympy as sp
 
 from ..model.closed_form import output
 from ..model.elements import Expr, Parameter
-from ..model.picture import Arrow, Box, Direction, Disk, Line, Pivot, Rod, Shape, Sphere, Spring
+from ..model.picture import (
+    Arrow,
+    Box,
+    Direction,
+    Disk,
+    Line,
+    Pivot,
+    Rod,
+    Shape,
+    Sphere,
+    Spring,
+    Track,
+)
 from .body import Ground, Marker
+from .curves import PointOnCurve
 from .draft import Draft
 from .joints import Distance, Joint, Universal
 from .loads import Gravity, SpringDamper
 from .motion import Motion, Placed
 from .solid import holds, solid
-from .vectors import AXES, Vector
+from .vectors import AXES, Vector, plus, times
 
 CARRIED = (Box, Rod, Sphere, Disk, Line, Spring)
 LARGEST = 3.0  # times the farthest distance of a marker from its body's centre: the solid of a body
@@ -49,10 +62,20 @@ def picture_of(draft: Draft, parts: Sequence[Any]) -> list[Shape]:
             shapes += _in_space(draft, motion, markers[body], reach)
     for part in parts:
         shapes += [] if planar else _of_part(draft, part)
+        shapes += [_curve(draft, part)] if isinstance(part, PointOnCurve) else []
     for part in parts:
         if part.name in draft.wrenches and isinstance(getattr(part, "second", None), Marker):
             shapes.append(_force(draft, part))
     return shapes
+
+
+def _curve(draft: Draft, part: PointOnCurve) -> Track:
+    """In the frame of its first marker."""
+    first, (_, over, (begin, end), _) = draft.placed[part.first], part.along()
+    at = first.point
+    for length, axis in zip(part.lengths(draft), first.axes, strict=False):
+        at = plus(at, times(length, axis.value))
+    return Track(_drawn(draft, at), over, begin, end)
 
 
 def shapes_of(body: Any) -> Sequence[Any]:
