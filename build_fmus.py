@@ -33,7 +33,6 @@ from lagfmu import LagfmuError, Verification, verify
 from lagfmu.api import package
 from lagfmu.cli.terminal import prepare_streams
 from lagfmu.fmu.compiler import HOST
-from lagfmu.fmu.face import USUAL, Face
 from lagfmu.fmu.native import takes_long
 from lagfmu.fmu.python import refusals
 from lagfmu.fmu.target import NATIVE, PYTHON, TARGETS, missing_for_native
@@ -65,11 +64,7 @@ class Made:
 
 
 def build_scene(
-    work: tuple[Path, str],
-    targets: Sequence[str],
-    out: Path,
-    platforms: Sequence[str],
-    face: Face = USUAL,
+    work: tuple[Path, str], targets: Sequence[str], out: Path, platforms: Sequence[str]
 ) -> list[Made]:
     """The FMUs of one scene of a model file, an FMU a target: what is prepared serves all."""
     path, name = work
@@ -86,8 +81,8 @@ def build_scene(
                 if target == PYTHON and (reasons := refusals(prepared)):
                     made.append(Made(name, target, refused="; ".join(reasons)))
                     continue
-                folder, forms = out / face.folder(target), file.closed_forms
-                fmu = package(prepared, folder, forms, target, platforms, reference=True, face=face)
+                folder, forms = out / target, file.closed_forms
+                fmu = package(prepared, folder, forms, target, platforms, reference=True)
                 spent = time.perf_counter() - begun
                 found = fmu.verification or verify(fmu.path)
                 runs = [found, *(verify(fmu.path) for _ in range(RUNS - 1))]
@@ -100,14 +95,10 @@ def build_scene(
 
 
 def build_all(
-    work: Sequence[tuple[Path, str]],
-    targets: Sequence[str],
-    out: Path,
-    platforms: Sequence[str],
-    face: Face = USUAL,
+    work: Sequence[tuple[Path, str]], targets: Sequence[str], out: Path, platforms: Sequence[str]
 ) -> Iterator[list[Made]]:
     """The FMUs of each scene in turn, made by as many processes as the machine has cores."""
-    build = partial(build_scene, targets=targets, out=out, platforms=platforms, face=face)
+    build = partial(build_scene, targets=targets, out=out, platforms=platforms)
     processes = min(len(work), os.cpu_count() or 1)
     if processes < 2:
         yield from map(build, work)
@@ -127,21 +118,14 @@ def main(
         list[str] | None,
         typer.Option(metavar="all|host|NAME...", help="Where native FMUs can run; repeatable."),
     ] = None,
-    fmi: Annotated[
-        int,
-        typer.Option(metavar="2|3", help="The version of FMI; of 3 there are native FMUs alone."),
-    ] = 2,
 ) -> None:
     """Build and verify the models in models/, for both targets."""
     prepare_streams()
-    face = Face(fmi)
     console = Console()
     places = tuple(platforms or [HOST])
     missing = missing_for_native()
     targets = (PYTHON,) if missing else TARGETS
-    if fmi == 3:
-        targets = (NATIVE,)
-    elif missing:
+    if missing:
         console.print(f"{missing}; python FMUs only", soft_wrap=True)
     problems: list[str] = []
     work: list[tuple[Path, str]] = []
@@ -165,7 +149,7 @@ def main(
     shown = console.is_terminal
     with Progress(*columns, console=console, transient=True, disable=not shown) as progress:
         task = progress.add_task("scenes", total=len(work))
-        for scene in build_all(work, targets, out, places, face):
+        for scene in build_all(work, targets, out, places):
             for made in scene:
                 problems += _report(console, width, made)
                 total += not made.refused

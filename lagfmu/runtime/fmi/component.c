@@ -103,6 +103,7 @@ static const char *mode_name(const Component *c) {
         case STEP_FAILED: return "step failed";
         case EVENT: return "event mode";
         case CONTINUOUS: return "continuous-time mode";
+        case BETWEEN: return "intermediate update mode";
         default: return "terminated";
     }
 }
@@ -123,7 +124,10 @@ int component_runs(Component *c, const Call *call, Batch *batch) {
         (void)fail(&text, "%s: no memory", call->name);
         return component_refuse(c, text.text);
     }
+    const Halt halt = c->instance.solver.halt;
+    c->instance.solver.halt = HALT_NEVER;
     batch_run(&c->instance, batch, states);
+    c->instance.solver.halt = halt;
     c->release(states);
     c->instance.phase = INSTANTIATED;
     return CALL_OK;
@@ -152,6 +156,14 @@ int component_forbidden(Component *c, const Call *call) {
     Why text;
     (void)fail(&text, "%s cannot be called in the state '%s' of a %s instance", call->name, mode_name(c),
                c->instance.exchange ? "Model Exchange" : "co-simulation");
+    return component_refuse(c, text.text);
+}
+
+int component_out_of_turn(Component *c, const Call *call) {
+    Why text;
+    (void)fail(&text, "%s: %s", call->name,
+               c->asked ? "within a step inputs are asked for, and nothing can be read now"
+                        : "within a step no input is asked for now");
     return component_refuse(c, text.text);
 }
 

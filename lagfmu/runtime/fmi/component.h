@@ -21,6 +21,8 @@ typedef struct Component {
     const char *name;
     unsigned logging; /* one bit a category */
     int meets;        /* 1: in co-simulation too the importer meets the events, in event mode */
+    char *named;      /* (VARIABLE_COUNT) 1: what the importer may get and set within a step; NULL: nothing */
+    int asked;        /* 1: within the step it is asked for inputs, and is not to read */
     void (*send)(const struct Component *c, int status, int category, const char *text); /* to the importer's log */
     void *(*allocate)(size_t count, size_t size);
     void (*release)(void *block);
@@ -50,19 +52,21 @@ SHARED void component_message(Component *c, int status, int category, const char
 SHARED int component_forbids(Component *c, const Call *call);
 
 /* The call returns CALL_ERROR (component_failed: `status`), and why: the text; the cause that a function of the
- * instance left, after the call's name or as it stands; a mode in which it cannot be; a pointer that is missing; a
+ * instance left, after the call's name or as it stands; a mode in which it cannot be, or the moment within a step; a pointer that is missing; a
  * value reference of no such variable; a value or a derivative that there is not. */
 SHARED int component_refuse(Component *c, const char *text);
 SHARED int component_refused(Component *c, const Call *call);
 SHARED int component_failed(Component *c, int status);
 SHARED int component_forbidden(Component *c, const Call *call);
+SHARED int component_out_of_turn(Component *c, const Call *call);
 SHARED int component_missing(Component *c, const Call *call);
 SHARED int component_unknown(Component *c, const Call *call, unsigned reference, const Group *group);
 SHARED int component_no_value(Component *c);
 SHARED int component_no_derivative(Component *c, const Call *call, const Variable *v);
 
-/* component_values.c: values by their references; all are checked before one is set.  NULL: no such variable. */
-SHARED const Variable *component_variable(unsigned reference, const Group *group);
+/* component_values.c: values by their references; all are checked before one is set.  NULL: no such variable, or none
+ * that the importer has named for what it does within a step, and the log has why. */
+SHARED const Variable *component_find(Component *c, const Call *call, unsigned reference, const Group *group);
 SHARED int component_get(Component *c, const Call *call, const Group *group, const unsigned references[], size_t count,
                          void *values);
 SHARED int component_set(Component *c, const Call *call, const Group *group, const unsigned references[], size_t count,
@@ -76,10 +80,14 @@ SHARED int component_serialized_size(Component *c, const Call *call, const void 
 SHARED int component_serialize(Component *c, const Call *call, const void *state, char *bytes, size_t size);
 SHARED int component_deserialize(Component *c, const Call *call, const char *bytes, size_t size, void **state);
 
-/* component_derivatives.c: how variables change along a direction, and with time. */
+/* component_derivatives.c: how variables change along a direction (seed of the knowns), how the sum
+ * of variables by their seeds does with each known, and how variables change with time. */
 SHARED int component_directional(Component *c, const Call *call, const Group *group, const unsigned unknowns[],
                                  size_t unknown_count, const unsigned knowns[], size_t known_count,
                                  const double seed[], double sensitivity[]);
+SHARED int component_adjoint(Component *c, const Call *call, const Group *group, const unsigned unknowns[],
+                             size_t unknown_count, const unsigned knowns[], size_t known_count, const double seed[],
+                             double sensitivity[]);
 SHARED int component_rates(Component *c, const Call *call, const Group *group, const unsigned references[],
                            size_t count, const int orders[], double values[]);
 SHARED int component_push(Component *c, const Call *call, const Group *group, const unsigned references[], size_t count,
@@ -88,6 +96,10 @@ SHARED int component_push(Component *c, const Call *call, const Group *group, co
 /* component_exchange.c: Model Exchange.  An array that is read has `expected` values, and `given` is the room. */
 SHARED int component_state_count(void);
 SHARED int component_enter_event(Component *c, const Call *call);
+
+/* Of both interface types: what follows at once in event mode.  `moved`: states of Model Exchange have changed;
+ * `again`: a contact or a friction has changed, and another instant is to follow. */
+SHARED int component_update(Component *c, int *moved, int *again);
 SHARED int component_set_time(Component *c, const Call *call, double time);
 SHARED int component_set_states(Component *c, const Call *call, const double states[], size_t given);
 SHARED int component_read(Component *c, const Call *call, Status (*read)(Instance *, double *), double *values,

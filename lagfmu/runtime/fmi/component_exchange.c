@@ -13,10 +13,31 @@ static int wrong_size(Component *c, const Call *call, size_t given, int expected
     return component_refuse(c, text.text);
 }
 
+static int has_clocks(void) {
+    return VARIABLE_COUNT > 0 && VARIABLES[VARIABLE_COUNT - 1].type == TYPE_CLOCK; /* which stand last */
+}
+
 int component_enter_event(Component *c, const Call *call) {
+    Instance *x = &c->instance;
     if (component_forbids(c, call)) return CALL_ERROR;
-    if (exchange_enter_event(&c->instance) != OK) return component_failed(c, CALL_ERROR);
+    if (!x->exchange && !c->meets) {
+        Why text;
+        (void)fail(&text, "%s: the instance was made without the event mode of co-simulation", call->name);
+        return component_refuse(c, text.text);
+    }
+    if ((x->exchange ? exchange_enter_event(x) : instance_meet(x)) != OK) return component_failed(c, CALL_ERROR);
     c->instance.phase = EVENT;
+    return CALL_OK;
+}
+
+int component_update(Component *c, int *moved, int *again) {
+    Instance *x = &c->instance;
+    *moved = *again = 0;
+    if (!x->exchange) return instance_settle(x, again) == OK ? CALL_OK : component_failed(c, CALL_ERROR);
+    instance_count_events(x);
+    if (exchange_event(x, moved) != OK) return component_failed(c, CALL_ERROR);
+    x->ticking = instance_event_happened(x);
+    *again = x->ticking && has_clocks();
     return CALL_OK;
 }
 

@@ -6,9 +6,18 @@
 
 #include "component.h"
 
-const Variable *component_variable(unsigned reference, const Group *group) {
-    if (reference >= (unsigned)VARIABLE_COUNT || !(group->types >> VARIABLES[reference].type & 1)) return NULL;
-    return &VARIABLES[reference];
+static int is_of(const Variable *v, const Group *group) { return (group->types >> v->type & 1) != 0; }
+
+const Variable *component_find(Component *c, const Call *call, unsigned reference, const Group *group) {
+    Why text;
+    if (reference >= (unsigned)VARIABLE_COUNT || !is_of(&VARIABLES[reference], group)) {
+        (void)component_unknown(c, call, reference, group);
+        return NULL;
+    }
+    if (c->instance.phase != BETWEEN || (c->named != NULL && c->named[reference])) return &VARIABLES[reference];
+    (void)fail(&text, "%s: '%s' was not named as an intermediate variable", call->name, VARIABLES[reference].name);
+    (void)component_refuse(c, text.text);
+    return NULL;
 }
 
 /* The value of a variable: before the initialization as it was set, later as it is. */
@@ -43,9 +52,10 @@ int component_get(Component *c, const Call *call, const Group *group, const unsi
     double found = 0;
     if (component_forbids(c, call)) return CALL_ERROR;
     if (count > 0 && (references == NULL || values == NULL)) return component_missing(c, call);
+    if (c->instance.phase == BETWEEN && c->asked) return component_out_of_turn(c, call);
     for (size_t k = 0; k < count; k++) {
-        const Variable *v = component_variable(references[k], group);
-        if (v == NULL) return component_unknown(c, call, references[k], group);
+        const Variable *v = component_find(c, call, references[k], group);
+        if (v == NULL) return CALL_ERROR;
         const int status = read_value(c, call, v, &found);
         if (status != CALL_OK) return status;
         store_number(group->form, values, k, found);
@@ -57,13 +67,16 @@ int component_set(Component *c, const Call *call, const Group *group, const unsi
                   const void *values) {
     if (component_forbids(c, call)) return CALL_ERROR;
     if (count > 0 && (references == NULL || values == NULL)) return component_missing(c, call);
+    if (c->instance.phase == BETWEEN && !c->asked) return component_out_of_turn(c, call);
     for (size_t k = 0; k < count; k++) {
-        const Variable *v = component_variable(references[k], group);
-        if (v == NULL) return component_unknown(c, call, references[k], group);
+        const Variable *v = component_find(c, call, references[k], group);
+        if (v == NULL) return CALL_ERROR;
         if (instance_settable(&c->instance, v, number_at(group->form, values, k)) != OK)
             return component_failed(c, CALL_ERROR);
     }
-    for (size_t k = 0; k < count; k++)
+    for (size_t k = 0; k < count && c->instance.phase == BETWEEN; k++)
+        c->instance.between.value[VARIABLES[references[k]].index] = number_at(group->form, values, k);
+    for (size_t k = 0; k < count && c->instance.phase != BETWEEN; k++)
         instance_put(&c->instance, &VARIABLES[references[k]], number_at(group->form, values, k));
     return CALL_OK;
 }

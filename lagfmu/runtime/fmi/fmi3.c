@@ -59,12 +59,14 @@ static Component3 *make(fmi3String name) {
     memset(&draft, 0, sizeof draft);
     (void)arena_take(&arena, 1, sizeof(Component3));
     (void)arena_take(&arena, name_size, 1);
+    (void)arena_take(&arena, (size_t)VARIABLE_COUNT, 1);
     instance_layout(&draft, &arena);
     arena = (Arena){calloc(1, arena.used), 0};
     if (arena.base == NULL) return NULL;
     Component3 *made = arena_take(&arena, 1, sizeof *made);
     char *kept = arena_take(&arena, name_size, 1);
     memcpy(kept, name, name_size);
+    made->common.named = arena_take(&arena, (size_t)VARIABLE_COUNT, 1);
     instance_layout(&made->common.instance, &arena);
     made->common.name = kept;
     made->common.send = log_of;
@@ -101,6 +103,15 @@ fmi3Instance fmi3InstantiateModelExchange(fmi3String instanceName, fmi3String in
                        instanceEnvironment, logMessage);
 }
 
+/* An importer that hears clocks has to come to event mode for it (section 2.2). */
+static Status check_clocks(const Component3 *made, const char *function, Why *why) {
+    for (int k = 0; k < VARIABLE_COUNT && !made->common.meets; k++)
+        if (VARIABLES[k].type == TYPE_CLOCK)
+            return fail(why, "%s: this FMU has clocks, '%s' for one, which tick in event mode: instantiate it with "
+                        "eventModeUsed, or build it without clocks", function, VARIABLES[k].name);
+    return OK;
+}
+
 fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String instantiationToken,
                                          fmi3String resourcePath, fmi3Boolean visible, fmi3Boolean loggingOn,
                                          fmi3Boolean eventModeUsed, fmi3Boolean earlyReturnAllowed,
@@ -110,17 +121,23 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String ins
                                          fmi3LogMessageCallback logMessage,
                                          fmi3IntermediateUpdateCallback intermediateUpdate) {
     static const char *const NAME = "fmi3InstantiateCoSimulation";
+    Why why;
     (void)resourcePath;
     (void)visible;
-    (void)requiredIntermediateVariables;
-    (void)nRequiredIntermediateVariables;
-    (void)intermediateUpdate;
-    (void)earlyReturnAllowed;
     Component3 *made = instantiate(NAME, instanceName, instantiationToken, 0, loggingOn, instanceEnvironment,
                                    logMessage);
     if (made == NULL) return NULL;
+    made->update = intermediateUpdate;
+    made->early = earlyReturnAllowed;
     made->common.meets = eventModeUsed;
-    return made;
+    made->common.instance.solver.halt = eventModeUsed ? (earlyReturnAllowed ? HALT_BEFORE : HALT_BEFORE_LAST)
+                                                      : (earlyReturnAllowed ? HALT_AFTER : HALT_NEVER);
+    if (check_clocks(made, NAME, &why) == OK &&
+        component3_name(made, NAME, requiredIntermediateVariables, nRequiredIntermediateVariables, &why) == OK)
+        return made;
+    log_text(logMessage, instanceEnvironment, fmi3Error, LOG_ERRORS, why.text);
+    fmi3FreeInstance(made);
+    return NULL;
 }
 
 fmi3Instance fmi3InstantiateScheduledExecution(fmi3String instanceName, fmi3String instantiationToken,

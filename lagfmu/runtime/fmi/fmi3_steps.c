@@ -20,14 +20,14 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discrete
                                     fmi3Float64 *nextEventTime) {
     const Call *call = FMI3_CALL(fmi3UpdateDiscreteStates);
     Component *c = instance;
-    int moved = 0;
+    int moved = 0, again = 0;
     if (component_forbids(c, call)) return fmi3Error;
     if (discreteStatesNeedUpdate == NULL || terminateSimulation == NULL ||
         nominalsOfContinuousStatesChanged == NULL || valuesOfContinuousStatesChanged == NULL ||
         nextEventTimeDefined == NULL || nextEventTime == NULL)
         return component_missing(c, call);
-    if (c->instance.exchange && exchange_event(&c->instance, &moved) != OK) return component_failed(c, fmi3Error);
-    *discreteStatesNeedUpdate = fmi3False;
+    if (component_update(c, &moved, &again) != CALL_OK) return fmi3Error;
+    *discreteStatesNeedUpdate = again;
     *terminateSimulation = *nominalsOfContinuousStatesChanged = *nextEventTimeDefined = fmi3False;
     *valuesOfContinuousStatesChanged = moved;
     *nextEventTime = 0;
@@ -55,8 +55,13 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
     *eventHandlingNeeded = *terminateSimulation = *earlyReturn = fmi3False;
     *lastSuccessfulTime = c->instance.solver.state.now.t;
     if (instance_steppable(&c->instance, t, h) != OK) return component_refused(c, call);
-    if (instance_step(&c->instance, t + h) != OK) return component_failed(c, fmi3Discard);
+    if (instance_step(&c->instance, t + h) != OK) {
+        *terminateSimulation = fmi3True; /* an importer that is told to go on tries the same step again */
+        return component_failed(c, fmi3Discard);
+    }
     *lastSuccessfulTime = c->instance.solver.state.now.t;
+    *eventHandlingNeeded = c->instance.solver.state.now.pending;
+    *earlyReturn = *lastSuccessfulTime < t + h;
     return fmi3OK;
 }
 

@@ -37,6 +37,9 @@ void instance_layout(Instance *x, Arena *arena) {
             x->before[k] = arena_take(&scratch, (size_t)event_count_of(system, (EventKind)k), sizeof(Count));
         x->shared = arena_ints(&scratch, system->frictions);
         x->happened = arena_ints(&scratch, indicators_count(system));
+        x->own_weight = arena_doubles(&scratch, (system->full != NULL ? system->full : system)->output_count);
+        x->between.supplied = arena_ints(&scratch, system->inputs);
+        x->between.value = arena_doubles(&scratch, system->inputs);
         x->indicators = arena_doubles(&scratch, indicators_count(system));
         x->pull = arena_doubles(&scratch, system->contacts);
         observed_layout(&x->seen, &scratch, system);
@@ -67,7 +70,7 @@ void instance_reset(Instance *x) {
     x->tolerance = 0;
     x->given.method = (MethodName)DEFAULT_METHOD;
     x->solver.on_demand = 1;
-    x->started = x->running = x->warned = x->moved = x->observed = x->evaluated = x->followed = 0;
+    x->started = x->running = x->warned = x->moved = x->ticking = x->observed = x->evaluated = x->followed = 0;
     memset(x->shared, 0, (size_t)x->solver.system->frictions * sizeof *x->shared);
     for (int k = 0; k < VARIABLE_COUNT; k++)
         if (VARIABLES[k].type == TYPE_REAL &&

@@ -16,10 +16,24 @@
 typedef enum { NOTE_WARNING, NOTE_EVENT, NOTE_DISCARD, NOTE_ERROR } Note;
 typedef void (*Tell)(void *context, Note note, const char *text);
 
+/* What an importer exchanges with an instance within a step; nothing where `look` is NULL. */
+typedef struct {
+    double (*look)(void *context, double t, double end); /* at time t [s], between two steps; where this one is to end */
+    void (*ask)(void *context, double t);                /* for the inputs at time t [s], into `value` */
+    int supplies;            /* 1: there are such inputs */
+    int *supplied;           /* (inputs) 1: it gives this one within steps */
+    double *value;           /* (inputs) the latest */
+    double asked, finished, end; /* [s] the latest time of each, of this step */
+    int paused;              /* 1: it looks */
+} Between;
+
 typedef struct Instance {
     Solver solver;
+    Between between;        /* context: that of tell() */
     Observed seen;          /* what can be read at the state; belongs to it while `observed` is 1 */
     Sensitivity along;      /* of the full system, where there is an embedding */
+    double *own_weight;     /* (outputs of the model's own) of instance_adjoint(), with */
+    Instant at;
     Settings given;         /* solver.* as they were set; tolerance 0: not set */
     double start_time;            /* [s] of the experiment; its end is solver.stop_time */
     double tolerance;             /* of the experiment; 0: none */
@@ -30,6 +44,7 @@ typedef struct Instance {
     Bars *bars;             /* error bars; NULL without */
     Past *past;             /* (estimated_count of the system) */
     double gain;            /* [1/s] of model exchange's stabilization; < 0: not known yet */
+    int ticking;            /* 1: an event of this instant has been met, and not yet what follows from it */
     int moved;              /* 1: in model exchange, an event has changed the states since this was told */
     int warned;             /* 1: a jump of a prescribed motion has been told; 2 << i: lookup i outside */
     double *places;         /* (lookup_count) scratch */
@@ -105,10 +120,31 @@ SHARED Status instance_observe(Instance *x);
 /* To t_end [s].  FAILED: everything is as it was before. */
 SHARED Status instance_step(Instance *x, double t_end);
 
+/* Events that an importer of co-simulation meets itself (instance_events.c; solver.halt says where steps end).  The
+ * limit from the right of the one that is pending, if there is one; what inputs that were set since bring about at once:
+ * `again`, 1 if a contact or a friction changes.  FAILED: everything is as it was before. */
+SHARED Status instance_meet(Instance *x);
+SHARED Status instance_settle(Instance *x, int *again);
+
+/* 1: that clock ticks at this instant; those of contacts come first, then those of frictions. */
+SHARED int instance_ticks(const Instance *x, int clock);
+
+/* Events are counted from here on; has there been one; what is told of them. */
+SHARED void instance_count_events(Instance *x);
+SHARED int instance_event_happened(const Instance *x);
+SHARED void instance_tell_events(Instance *x);
+
 /* How everything changes along a direction of time, stepped coordinates (nq), speeds (nv) and inputs;
  * then how one variable changes with it.  FAILED: it cannot be said, the cause is in x->solver.why. */
 SHARED Status instance_differentiate(Instance *x, Direction d);
 SHARED Status instance_change(const Instance *x, const Variable *v, Direction d, double *change);
+
+/* The adjoint: of the sum of weighted variables, by their value references.  First one transposed solve for it, then its
+ * change along a direction, for as many as there are; FAILED: it cannot be said, the cause is in x->solver.why, unless a
+ * variable's derivative is not defined: `undefined`, else NULL. */
+SHARED Status instance_adjoint(Instance *x, const unsigned unknowns[], const double weights[], size_t count);
+SHARED Status instance_gradient(Instance *x, const unsigned unknowns[], const double weights[], size_t count,
+                                Direction d, double *sum, const Variable **undefined);
 
 /* The same along the motion: the derivative of a variable with respect to time. */
 SHARED Status instance_rates(Instance *x, Direction *d);

@@ -8,7 +8,7 @@ typedef struct {
     Numbers now;
     Settings settings, given;
     double since, start_time, stop_time, tolerance, gain;
-    int exchange, phase, started, running, warned, moved;
+    int exchange, phase, started, running, warned, moved, ticking;
 } Record;
 
 static size_t record_head(void) { return (sizeof(Record) + 15) / 16 * 16; }
@@ -32,6 +32,7 @@ void instance_restore(Instance *x, const char *record) {
     x->started = head.started;
     x->running = head.running;
     x->moved = head.moved;
+    x->ticking = head.ticking;
     x->gain = head.gain;
     x->warned = head.warned;
     x->observed = x->evaluated = x->followed = 0;
@@ -63,6 +64,7 @@ void instance_save(Instance *x, char *record) {
     head.running = x->running;
     head.warned = x->warned;
     head.moved = x->moved;
+    head.ticking = x->ticking;
     head.gain = x->gain;
     if (ERROR_BARS != NULL) ERROR_BARS->save(x);
     memcpy(record, &head, sizeof head);

@@ -42,56 +42,6 @@ static void move_inputs(Instance *x, double t) {
     drive->since = t;
 }
 
-/* What contact, or friction, i has done in this step, and when it did so last. */
-static void report(Instance *x, EventKind kind, int i) {
-    static const char *const SORT[] = {"contact", "contact", "friction", "friction"};
-    static const char *const DONE[] = {"opened", "closed", "began to slip", "began to stick"};
-    const Solver *s = &x->solver;
-    const Latest *latest = &s->state.latest[kind];
-    const Count again = latest->count[i] - x->before[kind][i];
-    const int struck = kind == CLOSING && s->state.impulse[i] > 0;
-    const char *name = kind <= CLOSING ? s->system->rows[s->system->contact[i]].name : s->system->friction[i].name;
-    const char *stays = struck && s->state.closed[i] ? ", and stays closed" : "";
-    char impulse[80] = "", more[32] = "";
-    if (again == 0) return;
-    if (struck)
-        (void)snprintf(impulse, sizeof impulse, ", impulse %s (of its lambda times s)",
-                       digits(s->state.impulse[i]).text);
-    if (again > 1) (void)snprintf(more, sizeof more, ", the latest of %.0f", (double)again);
-    (void)snprintf(x->note, sizeof x->note, "%s %s %s at t = %s s%s%s%s", SORT[kind], name,
-                   struck ? "was struck" : DONE[kind], digits(latest->time[i]).text, impulse, more, stays);
-    x->tell(x->context, NOTE_EVENT, x->note);
-}
-
-/* Of two kinds that take turns, the one that was first. */
-static void report_both(Instance *x, EventKind one, EventKind other, int i) {
-    const Latest *latest = x->solver.state.latest;
-    const int turned = latest[other].time[i] < latest[one].time[i];
-    report(x, turned ? other : one, i);
-    report(x, turned ? one : other, i);
-}
-
-static void report_events(Instance *x) {
-    const System *s = x->solver.system;
-    if (x->quiet) return;
-    for (int c = 0; c < s->contacts; c++) report_both(x, CLOSING, DEPARTURE, c);
-    for (int i = 0; i < s->frictions; i++) report_both(x, SLIPPING, STICKING, i);
-}
-
-static int has_closed(const Instance *x) {
-    int any = 0;
-    for (int c = 0; c < x->solver.system->contacts; c++)
-        any |= x->solver.state.latest[CLOSING].count[c] != x->before[CLOSING][c];
-    return any;
-}
-
-static void remember_counts(Instance *x) {
-    for (int k = 0; k < EVENT_KINDS; k++) {
-        const int count = event_count_of(x->solver.system, (EventKind)k);
-        memcpy(x->before[k], x->solver.state.latest[k].count, (size_t)count * sizeof(Count));
-    }
-}
-
 /* Of `auto`: why radau5 took over, the first time; then each change that a communication step ends with. */
 static void tell_of_method(Instance *x, double product, int implicit) {
     const Choice *c = &x->solver.state.now.choice;
@@ -106,37 +56,119 @@ static void tell_of_method(Instance *x, double product, int implicit) {
     x->tell(x->context, NOTE_EVENT, x->note);
 }
 
-Status instance_step(Instance *x, double t_end) {
-    Solver *s = &x->solver;
-    if (solver_pass(s, t_end)) {
-        x->observed = x->evaluated = 0;
-        if (ERROR_BARS != NULL) ERROR_BARS->follow(x, t_end);
-        if (ERROR_BARS != NULL) ERROR_BARS->widen(x);
-        return OK;
+/* ------------------------------------------------------------------ what the importer does within a step */
+
+/* Inputs at a time of the step, for which it is asked once; those that it gave last where it may not be asked. */
+static void supply(void *caller, double t, double *u) {
+    Instance *x = caller;
+    Between *between = &x->between;
+    if (t != between->asked && t >= between->finished && t <= between->end && !between->paused) {
+        between->asked = t;
+        between->ask(x->context, t);
     }
+    for (int k = 0; k < x->solver.system->inputs; k++)
+        if (between->supplied[k]) u[k] = between->value[k];
+}
+
+/* It looks at the state, which is final; when the step is to end. */
+static double let_look(Instance *x, double end) {
+    Between *between = &x->between;
+    x->observed = x->evaluated = 0;
+    between->finished = x->solver.state.now.t;
+    between->paused = 1;
+    const double sooner = between->look(x->context, between->finished, end);
+    between->paused = 0;
+    return fmin(fmax(sooner, between->finished), end);
+}
+
+static void pause_step(void *caller, double *t_end) {
+    Instance *x = caller;
+    *t_end = let_look(x, *t_end);
+    x->observed = x->evaluated = 0;
+}
+
+static void open_step(Instance *x, double t_end) {
+    Between *between = &x->between;
+    Solver *s = &x->solver;
+    if (between->look == NULL) return;
+    between->finished = s->state.now.t;
+    between->end = t_end;
+    between->asked = NAN;
+    s->caller = x;
+    s->pause = pause_step;
+    if (!between->supplies) return;
+    memcpy(between->value, s->drive.value, (size_t)s->system->inputs * sizeof *between->value);
+    s->supply = supply;
+}
+
+/* The inputs that it supplied stay as they were at last. */
+static void close_step(Instance *x) {
+    Solver *s = &x->solver;
+    s->pause = NULL;
+    if (s->supply == NULL) return;
+    s->supply(x, s->state.now.t, s->u);
+    s->supply = NULL;
+    for (int k = 0; k < s->system->inputs; k++) {
+        if (!x->between.supplied[k]) continue;
+        s->drive.value[k] = x->between.value[k];
+        s->drive.first[k] = s->drive.second[k] = 0;
+    }
+}
+
+/* ------------------------------------------------------------------ a step */
+
+static void prepare_step(Instance *x, double t_end) {
     instance_unfollow(x);
     instance_save(x, x->backup);
     if (PRESCRIBED != NULL) PRESCRIBED->begin_step(x);
-    s->drive.turned = instance_turned(x);
-    memcpy(x->expected, s->drive.value, (size_t)s->system->inputs * sizeof *x->expected);
-    if (s->system->contacts + s->system->frictions > 0) remember_counts(x);
+    x->solver.drive.turned = instance_turned(x);
+    memcpy(x->expected, x->solver.drive.value, (size_t)x->solver.system->inputs * sizeof *x->expected);
+    instance_count_events(x);
     if (ERROR_BARS != NULL) ERROR_BARS->begin_step(x, t_end);
     x->observed = x->evaluated = 0;
-    const double product = s->state.now.choice.product;
-    const int implicit = s->state.now.choice.implicit;
-    s->passed.text[0] = '\0';
-    if (solver_advance(s, t_end) != OK) {
-        instance_restore(x, x->backup);
-        return FAILED;
-    }
-    if (ERROR_BARS != NULL) ERROR_BARS->follow(x, t_end);
-    move_inputs(x, t_end);
+    x->solver.passed.text[0] = '\0';
+    open_step(x, t_end);
+}
+
+/* From where it ends, whatever t_end was. */
+static void finish_step(Instance *x) {
+    Solver *s = &x->solver;
+    const double t = s->state.now.t;
+    close_step(x);
+    if (ERROR_BARS != NULL) ERROR_BARS->follow(x, t);
+    move_inputs(x, t);
     memset(x->set, 0, (size_t)s->system->inputs * sizeof *x->set);
     if (s->passed.text[0] != '\0') x->tell(x->context, NOTE_WARNING, s->passed.text);
     if (s->system->lookup_count > 0) warn_of_tables(x);
-    if (s->system->contacts + s->system->frictions > 0) report_events(x);
-    if (has_closed(x)) instance_warn_of_shares(x);
-    tell_of_method(x, product, implicit);
+    instance_tell_events(x);
+}
+
+/* What is read at the end is what the error bars take in, and the importer may look at. */
+static void show_end(Instance *x) {
     if (ERROR_BARS != NULL) ERROR_BARS->widen(x);
+    if (x->between.look != NULL) (void)let_look(x, x->solver.state.now.t);
+}
+
+Status instance_step(Instance *x, double t_end) {
+    Solver *s = &x->solver;
+    x->ticking = 0;
+    if (solver_pass(s, t_end)) {
+        x->observed = x->evaluated = 0;
+        if (ERROR_BARS != NULL) ERROR_BARS->follow(x, t_end);
+        show_end(x);
+        return OK;
+    }
+    const double product = s->state.now.choice.product;
+    const int implicit = s->state.now.choice.implicit;
+    prepare_step(x, t_end);
+    if (solver_advance(s, t_end) != OK) {
+        s->supply = NULL;
+        s->pause = NULL;
+        instance_restore(x, x->backup);
+        return FAILED;
+    }
+    finish_step(x);
+    tell_of_method(x, product, implicit);
+    show_end(x);
     return OK;
 }

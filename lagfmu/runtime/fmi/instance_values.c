@@ -12,6 +12,7 @@
 /* What is read after an input was set is read at the state with which the next step begins. */
 static Status follow(Instance *x) {
     if (x->followed || x->exchange || !x->started || !x->running) return OK;
+    if (x->solver.state.now.pending || x->between.paused) return OK; /* the limit from the left */
     const int estimated = PRESCRIBED != NULL && PRESCRIBED->was_set(x);
     if (!estimated && !instance_turned(x)) return OK;
     instance_save(x, x->backup);
@@ -128,6 +129,14 @@ static Status indicator(Instance *x, int i, double *value) {
 
 Status instance_get(Instance *x, const Variable *v, double *value) {
     const int estimated = v->place == AT_INPUT && x->solver.system->estimated_count > 0;
+    if (v->place == AT_INPUT && x->between.paused && x->between.supplied[v->index]) {
+        *value = x->between.value[v->index];
+        return OK;
+    }
+    if (v->place == AT_CLOCK) {
+        *value = instance_ticks(x, v->index);
+        return OK;
+    }
     if (!estimated && instance_was_set(x, v, value)) return OK;
     if (v->place == AT_ERROR) return ERROR_BARS->get(x, v, value);
     if (v->place == AT_INDICATOR) return indicator(x, v->index, value);

@@ -70,6 +70,7 @@ static const Saved OF_SOLVER[] = {
     NOW("approach to a singular configuration", approach.apart, FINITE),
     NOW("approach to a singular configuration", approach.until, FINITE),
     NOW("count of events", event_count, COUNT),
+    NOW("event that is reached", pending, FLAG),
     NOW("time", t, FINITE),
     NOW("natural rate", rate, LIMIT),
     NOW("step", step, LIMIT),
@@ -115,6 +116,7 @@ static const Saved OF_SOLVER[] = {
 static const Saved OF_INSTANCE[] = {
     INSTANCE("type", exchange, FLAG, ONE),
     INSTANCE("whether an event has moved the states", moved, FLAG, ONE),
+    INSTANCE("whether clocks tick", ticking, FLAG, ONE),
     INSTANCE("stabilization", gain, FINITE, ONE),
     INSTANCE("mode", started, FLAG, ONE),
     INSTANCE("mode", running, FLAG, ONE),
@@ -209,6 +211,8 @@ static Status together_in_solver(Instance *x, const Solver *s) {
         return restored_none(x, "approach to a singular configuration", 1);
     if (now->between && !(now->ahead && x->started && !x->exchange))
         return restored_none(x, "mode of the step ahead", now->between);
+    if (now->pending && (now->ahead || !x->started || x->exchange))
+        return restored_none(x, "event that is reached", now->pending);
     if (now->event_count > indicators_count(s->system))
         return restored_none(x, "count of events", now->event_count);
     if (!(now->t_old <= now->t_integrator)) return restored_none(x, "integrator's time", now->t_old);

@@ -8,7 +8,11 @@
  *   b = dF + dG^T lambda - dM vdot ,  c = dgamma - dG vdot ,  dq' = B dv + dB v + db
  *
  * a further solve with the factors that gave vdot and lambda (implicit function theorem; Hairer &
- * Wanner II, sect. VII.1, for index-1 equations). */
+ * Wanner II, sect. VII.1, for index-1 equations).  Weights a of dvdot and l of dlambda are weights x of b and mu of c,
+ *
+ *   M x + G^T mu = a ,  -G x = l :
+ *
+ * one such solve for all directions (the adjoint; Griewank & Walther, Evaluating Derivatives, 2008, ch. 3). */
 #include "sensitivity.h"
 
 #include <math.h>
@@ -31,6 +35,11 @@ void sensitivity_layout(Sensitivity *w, Arena *arena, const System *s) {
     w->dv = arena_doubles(arena, s->nv);
     w->du = arena_doubles(arena, s->inputs);
     w->dforce = arena_doubles(arena, s->nv);
+    w->known = arena_doubles(arena, s->m);
+    w->on_vdot = arena_doubles(arena, s->nv);
+    w->on_lambda = arena_doubles(arena, s->m);
+    w->on_b = arena_doubles(arena, s->nv);
+    w->on_c = arena_doubles(arena, s->m);
     w->down = arena_doubles(arena, s->output_count);
     w->dother = arena_doubles(arena, s->output_count);
 }
@@ -51,8 +60,7 @@ static void right_sides(Sensitivity *w, const Mechanism *b) {
     }
 }
 
-Status sensitivity_along(Sensitivity *w, Mechanism *b, Instant at, const double *q,
-                         const double *v, Direction d) {
+Status sensitivity_sides(Sensitivity *w, Mechanism *b, Instant at, const double *q, const double *v, Direction d) {
     const System *s = b->system;
     s->tangent(at.t, q, v, at.u, at.p, d.dt, d.dq, d.dv, d.du, w->dM, w->dF, w->dG, w->dnu,
                w->dgamma, w->df, w->denergy);
@@ -69,6 +77,13 @@ Status sensitivity_along(Sensitivity *w, Mechanism *b, Instant at, const double 
         if (!isfinite(w->c[k]))
             return fail(b->why, "the derivative of constraint %s is not finite at t = %.17g s",
                         s->rows[k].name, at.t);
+    return OK;
+}
+
+Status sensitivity_along(Sensitivity *w, Mechanism *b, Instant at, const double *q,
+                         const double *v, Direction d) {
+    const System *s = b->system;
+    if (sensitivity_sides(w, b, at, q, v, d) != OK) return FAILED;
     if (linear_solve(&b->linear, w->b, w->c, w->dvdot, w->dlambda) == OK) return OK;
     for (int k = 0; k < s->m; k++)
         if (!b->linear.unique[k])
@@ -78,6 +93,16 @@ Status sensitivity_along(Sensitivity *w, Mechanism *b, Instant at, const double 
                         "along them",
                         s->rows[k].name);
     return FAILED;
+}
+
+Status sensitivity_adjoint(Sensitivity *w, Mechanism *b) {
+    const System *s = b->system;
+    for (int k = 0; k < s->m; k++) w->c[k] = -w->on_lambda[k];
+    if (linear_nearest(&b->linear, w->on_vdot, w->c, w->on_b, w->on_c) != OK) return FAILED;
+    for (int k = 0; k < s->m; k++) w->on_c[k] = -w->on_c[k];
+    memset(w->dvdot, 0, (size_t)s->nv * sizeof *w->dvdot);
+    memset(w->dlambda, 0, (size_t)s->m * sizeof *w->dlambda);
+    return OK;
 }
 
 void sensitivity_of_energies(Sensitivity *w, const System *s, Instant at, const double *q,

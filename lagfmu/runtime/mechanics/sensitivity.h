@@ -21,6 +21,9 @@ typedef struct {
     double *dq, *dv, *du;    /* (nq), (nv), (inputs): a direction, for whoever asks */
     double *dforce;          /* (nv) change of Q */
     double *down, *dother;   /* (output_count) changes of these */
+    double *known;           /* (m) dlambda where it is unique, no numbers elsewhere */
+    double *on_vdot, *on_lambda;     /* (nv), (m) weights, and ... */
+    double *on_b, *on_c;             /* ... those of b and c that follow from them */
 } Sensitivity;
 
 SHARED void sensitivity_layout(Sensitivity *w, Arena *arena, const System *s);
@@ -29,6 +32,14 @@ SHARED void sensitivity_layout(Sensitivity *w, Arena *arena, const System *s);
  * the latest that was done with `b`. */
 SHARED Status sensitivity_along(Sensitivity *w, Mechanism *b, Instant at, const double *q,
                                 const double *v, Direction d);
+
+/* The same but dvdot and dlambda, for which nothing is solved: those of the coefficients, and the right sides b, c. */
+SHARED Status sensitivity_sides(Sensitivity *w, Mechanism *b, Instant at, const double *q, const double *v,
+                                Direction d);
+
+/* The transposed solve with the factors of that motion:  on_vdot . dvdot + on_lambda . dlambda = on_b . b + on_c . c
+ * for every direction.  What dvdot and dlambda are after it is 0. */
+SHARED Status sensitivity_adjoint(Sensitivity *w, Mechanism *b);
 
 /* Changes of the energies along a direction, of a system of which coordinates are only read. */
 SHARED void sensitivity_of_energies(Sensitivity *w, const System *s, Instant at, const double *q,

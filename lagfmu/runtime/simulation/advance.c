@@ -245,8 +245,8 @@ static Status arrive(Solver *s, double t_end) {
     return OK;
 }
 
-/* The event in the step just taken: the modes are switched there. */
-static Status meet(Solver *s) {
+/* The event in the step just taken: the state there, in the modes before it. */
+static Status reach_event(Solver *s) {
     Integrator *i = &s->integrator;
     const double t = s->state.now.event_time;
     double *y = s->work_advance;
@@ -261,6 +261,15 @@ static Status meet(Solver *s) {
     }
     s->state.now.ahead = 0;
     s->state.now.event_count = 0;
+    s->state.now.pending = 1;
+    return OK;
+}
+
+/* The modes are switched there. */
+Status solver_meet(Solver *s) {
+    if (!s->state.now.pending) return OK;
+    s->state.now.pending = 0;
+    segment_begin(s);
     if (s->system->switches > 0) OPTIONAL.switches->pass(s, s->state.left + s->system->contacts);
     if (s->system->contacts + s->system->frictions > 0 && OPTIONAL.modes_switch(s, s->state.left) != OK)
         return FAILED;
@@ -311,16 +320,38 @@ static Status check_headway(Solver *s, double t_end, double begun, Count first) 
     return OK;
 }
 
+static int halts_before(const Solver *s, double t_end) {
+    return s->halt == HALT_BEFORE || (s->halt == HALT_BEFORE_LAST && s->state.now.t == t_end);
+}
+
+/* The caller looks at where the integrator stands; nothing of it is kept but that t_end comes nearer. */
+static void pause_there(Solver *s, double *t_end) {
+    State *x = &s->state;
+    const Integrator *i = &s->integrator;
+    const Numbers kept = x->now;
+    double *y = s->work_pause;
+    if (s->pause == NULL || x->now.event_count > 0 || !(i->t < *t_end)) return;
+    state_gather(s->system, x->q, x->v, y);
+    put(s, i->t, i->y);
+    x->now.lost = kept.lost_ahead;
+    s->pause(s->caller, t_end);
+    state_scatter(s->system, y, x->q, x->v);
+    x->now = kept;
+    segment_begin(s);
+}
+
 /* To t_end, or to the first event before it. */
-static Status travel(Solver *s, double t_end, double begun, Count first, int *met) {
+static Status travel(Solver *s, double *end, double begun, Count first, int *met) {
     Numbers *now = &s->state.now;
     segment_begin(s);
     *met = 0;
     if (!now->ahead && set_out(s) != OK) return FAILED;
     for (;;) {
+        const double t_end = *end;
         if (now->event_count > 0 && now->event_time <= t_end) {
             *met = 1;
-            return meet(s);
+            if (reach_event(s) != OK) return FAILED;
+            return halts_before(s, t_end) ? OK : solver_meet(s);
         }
         if (s->integrator.t >= t_end) return arrive(s, t_end);
         if (s->peaks > 0 && OPTIONAL.peaks->pass(s, s->integrator.t, NULL) != OK) return FAILED;
@@ -329,7 +360,21 @@ static Status travel(Solver *s, double t_end, double begun, Count first, int *me
             return FAILED;
         }
         if (check_headway(s, t_end, begun, first) != OK) return FAILED;
+        pause_there(s, end);
     }
+}
+
+/* FAILED: so many events in next to no time that they may never end. */
+static Status check_crowd(Solver *s) {
+    Numbers *now = &s->state.now;
+    if (s->crowd == 0 || !(fabs(now->t - s->crowd_since) < AT_ONCE / nominals_pace(s))) {
+        s->crowd_since = now->t;
+        s->crowd = 0;
+    }
+    s->crowd += 1;
+    if (s->crowd < CHATTER) return OK;
+    (void)fail(&s->why, "%d events in %.1g s at t = %.17g s", CHATTER, now->t - s->crowd_since, now->t);
+    return tell_of_chatter(s, s->crowd_since);
 }
 
 static Status complete_nominals(Solver *s, double span) {
@@ -343,31 +388,22 @@ Status solver_advance(Solver *s, double t_end) {
     Numbers *now = &s->state.now;
     const double begun = now->t;
     const Count first = now->steps;
-    double since = begun;
-    int events = 0;
     if (!(t_end > begun) || !(t_end < HUGE_VAL))
         return fail(&s->why, "a communication step must end after t = %.17g s, got %.17g s", begun,
                     t_end);
     now->tiny = 0;
     s->taken = now->ahead ? now->t_integrator - now->t_old : 0;
     resume(s);
-    if (solver_follow(s) != OK) return FAILED;
+    if (solver_meet(s) != OK || solver_follow(s) != OK) return FAILED;
     if (nominals_incomplete(s) && complete_nominals(s, t_end - begun) != OK) return FAILED;
+    if (s->halt == HALT_NEVER) s->crowd = 0; /* else they come one in each call */
     while (now->t < t_end) {
         int met;
-        if (travel(s, t_end, begun, first, &met) != OK) return FAILED;
-        if (!met) continue;
-        if (events == 0 || now->t - since >= AT_ONCE / nominals_pace(s)) {
-            since = now->t;
-            events = 0;
-        }
-        events += 1;
-        if (events == CHATTER) {
-            (void)fail(&s->why, "%d events in %.1g s at t = %.17g s", CHATTER, now->t - since, now->t);
-            return tell_of_chatter(s, since);
-        }
+        if (travel(s, &t_end, begun, first, &met) != OK) return FAILED;
+        if (met && check_crowd(s) != OK) return FAILED;
+        if (now->pending || (met && s->halt == HALT_AFTER)) break;
     }
-    now->span = t_end - begun;
+    now->span = now->t - begun;
     keep(s);
     return check_lost(s);
 }

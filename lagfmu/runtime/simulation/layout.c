@@ -71,6 +71,7 @@ void solver_layout(Solver *s, Arena *saved, Arena *scratch, const System *system
     s->iwork_contacts = arena_ints(scratch, m + 2 * contacts);
     s->work_passage = arena_doubles(scratch, OPTIONAL.passage != NULL ? states : 0);
     s->work_advance = arena_doubles(scratch, 2 * states);
+    s->work_pause = arena_doubles(scratch, states);
     s->work_events = arena_doubles(scratch, 3 * states + indicators +
                                                 (indicators == 0 ? 0 : event_search_doubles(indicators)));
     if (s->peaks > 0) {

@@ -33,7 +33,7 @@ static const Interval *bound_rates(Solver *s, double a, double b, double *y) {
     Interval *q = (Interval *)(void *)(u + 3 * driven), *w = q + states, *rate = w + driven;
     for (int k = 0; k < 3; k++) {
         i->method->dense(i, t[k], y + k * states);
-        if (inputs > 0) drive_at(system, &s->drive, t[k], u + k * driven);
+        segment_inputs(s, t[k], u + k * driven);
     }
     for (int j = 0; j < states; j++) q[j] = box(y[j], y[states + j], y[2 * states + j]);
     for (int j = 0; j < inputs; j++) w[j] = box(u[j], u[driven + j], u[2 * driven + j]);

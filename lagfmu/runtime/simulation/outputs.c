@@ -10,6 +10,7 @@
 #include "outputs.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "digits.h"
 #include "numbers.h"
@@ -109,15 +110,53 @@ void outputs_change(Sensitivity *w, const Mechanism *b, const System *s, Instant
     for (int j = 0; j < s->nv; j++) w->dforce[j] = 0;
     for (int e = 0; b != NULL && e < s->entries; e++) w->dforce[s->entry_column[e]] += sensitivity_share(w, b, e);
     if (s->outputs_tangent == NULL) return;
-    for (int k = 0; b != NULL && k < s->m; k++) w->c[k] = o->unique[k] ? w->dlambda[k] : NAN;
+    for (int k = 0; b != NULL && k < s->m; k++) w->known[k] = o->unique[k] ? w->dlambda[k] : NAN;
     /* the values tell which of a guarded output's two expressions holds: */
     s->outputs(at.t, o->q, o->v, at.u, at.p, o->vdot, o->lambda, o->force, o->own, o->other);
     s->outputs_tangent(at.t, o->q, o->v, at.u, at.p, o->vdot, o->lambda, o->force, d.dt, d.dq, d.dv,
-                       d.du, w->dvdot, w->c, w->dforce, w->down, w->dother);
+                       d.du, w->dvdot, w->known, w->dforce, w->down, w->dother);
     if (b != NULL && s->unique_count > 0) change_unique(w, s, at, o, d);
     for (int i = 0; i < s->output_count; i++) {
         if (isfinite(o->own[i]) || !s->guarded[i]) continue;
         o->own[i] = o->other[i];
         w->down[i] = w->dother[i];
     }
+}
+
+/* The weighted change along what of w stands for it. */
+static double weigh(Sensitivity *w, const System *s, Instant at, const Observed *o, const double *weight) {
+    double sum = 0;
+    s->outputs_tangent(at.t, o->q, o->v, at.u, at.p, o->vdot, o->lambda, o->force, 0, w->dq, w->dv, w->du, w->dvdot,
+                       w->dlambda, w->dforce, w->down, w->dother);
+    for (int i = 0; i < s->output_count; i++)
+        if (weight[i] != 0) sum += weight[i] * (isfinite(o->own[i]) || !s->guarded[i] ? w->down[i] : w->dother[i]);
+    return sum;
+}
+
+void outputs_weigh(Sensitivity *w, const Mechanism *b, const System *s, Instant at, const Observed *o,
+                   const double *weight) {
+    int any = 0;
+    for (int i = 0; i < s->output_count; i++) any |= weight[i] != 0;
+    if (!any || s->outputs_tangent == NULL) return;
+    s->outputs(at.t, o->q, o->v, at.u, at.p, o->vdot, o->lambda, o->force, o->own, o->other);
+    memset(w->dq, 0, (size_t)s->nq * sizeof *w->dq);
+    memset(w->dv, 0, (size_t)s->nv * sizeof *w->dv);
+    memset(w->du, 0, (size_t)s->inputs * sizeof *w->du);
+    memset(w->dvdot, 0, (size_t)s->nv * sizeof *w->dvdot);
+    memset(w->dlambda, 0, (size_t)s->m * sizeof *w->dlambda);
+    memset(w->dforce, 0, (size_t)s->nv * sizeof *w->dforce);
+    for (int i = 0; i < s->nv; i++) {
+        w->dvdot[i] = 1;
+        w->on_vdot[i] += weigh(w, s, at, o, weight);
+        w->dvdot[i] = 0;
+    }
+    for (int k = 0; k < s->m; k++) {
+        w->dlambda[k] = 1;
+        for (int e = s->row_start[k]; e < s->row_start[k + 1]; e++) w->dforce[s->entry_column[e]] = b->G[e];
+        w->on_lambda[k] += weigh(w, s, at, o, weight);
+        for (int e = s->row_start[k]; e < s->row_start[k + 1]; e++) w->dforce[s->entry_column[e]] = 0;
+        w->dlambda[k] = 0;
+    }
+    for (int i = 0; i < s->output_count; i++)
+        if (!isfinite(o->own[i]) && s->guarded[i]) o->own[i] = o->other[i];
 }

@@ -31,9 +31,15 @@ void segment_choose_rows(Solver *s) {
     s->stepped.dependent = s->state.now.dependent;
 }
 
+void segment_inputs(const Solver *s, double t, double *u) {
+    if (s->system->inputs == 0) return;
+    drive_at(s->system, &s->drive, t, u);
+    if (s->supply != NULL) s->supply(s->caller, t, u);
+}
+
 Instant segment_instant(Solver *s, double t) {
     const System *system = s->system;
-    if (system->inputs > 0) drive_at(system, &s->drive, t, s->u);
+    segment_inputs(s, t, s->u);
     for (int k = 0; k < system->switches; k++) s->u[system->inputs + k] = s->state.switch_state[k];
     return (Instant){t, s->u, s->p};
 }

@@ -21,6 +21,9 @@ SHARED double segment_fewest_steps(const Solver *s);
  * remembered; factors are lost. */
 SHARED void segment_choose_rows(Solver *s);
 
+/* u (inputs) at time t, by their polynomials, or as the caller supplies them. */
+SHARED void segment_inputs(const Solver *s, double t, double *u);
+
 /* Time t with the inputs then, and the switch states behind them (kept in s->u). */
 SHARED Instant segment_instant(Solver *s, double t);
 

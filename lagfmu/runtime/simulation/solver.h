@@ -8,6 +8,10 @@
 #include "sensitivity.h"
 #include "state.h"
 
+/* Where solver_advance() ends before its t_end: nowhere, but an event is passed within; after each event; before its
+ * modes change, at each event or at one that lies at t_end. */
+typedef enum { HALT_NEVER, HALT_AFTER, HALT_BEFORE, HALT_BEFORE_LAST } Halt;
+
 /* What an importer can read at a state; arrays of the full system (nq, nv, m, entries). */
 typedef struct {
     double *q, *v, *vdot;          /* (nq), (nv), (nv) of the full system */
@@ -31,6 +35,14 @@ typedef struct Solver {
     Settings settings;
     double stop_time;          /* [s]; infinite if it is not defined: never stepped past */
     int on_demand;             /* 1: q and v between two steps are found when the caller asks: solver_arrive() */
+    Halt halt;
+    double crowd_since;        /* [s] events one upon the other: when they began, ... */
+    int crowd;                 /* ... and how many there are */
+    /* What the caller does within a step; NULL: nothing.  The inputs at a time, those that are not by their
+     * polynomials: u (inputs).  Between two steps, at the state of now: t_end may come nearer, and nothing else changes. */
+    void (*supply)(void *caller, double t, double *u);
+    void (*pause)(void *caller, double *t_end);
+    void *caller;
     double limit;              /* [s] of a step, of the finer run of error bars (bars.h); 0: none */
     double first, taken;       /* [s] the first and the longest step that led to the communication point */
     State state;
@@ -57,6 +69,7 @@ typedef struct Solver {
     double apart, narrowest;   /* linear_apart() at the latest stage, and the least of a step */
     double *work_passage;      /* (states) of passage.c */
     double *work_advance;      /* (2 states) of advance.c and exchange.c */
+    double *work_pause;        /* (states) */
     double *work_events;       /* (3 states + indicators and all samples) of events.c and exchange_gain.c */
     double *work_gap;    /* of minimum_gap.c */
     Observed peak_seen;        /* of peaks.c, with */
@@ -97,9 +110,12 @@ SHARED Status solver_start(Solver *s, double t, const double *q0, const double *
 /* No state yet: at t [s], with nothing in it.  For a start that was refused. */
 SHARED void solver_clear(Solver *s, double t);
 
-/* advance.c -- from state.now.t to t_end [s].  FAILED leaves the state in disorder: the caller
- * puts the saved one back (it keeps a copy). */
+/* advance.c -- from state.now.t to t_end [s], or as far as `halt` says.  FAILED leaves the state in disorder: the
+ * caller puts the saved one back (it keeps a copy). */
 SHARED Status solver_advance(Solver *s, double t_end);
+
+/* The event that is pending, if there is one: the modes after it, the limit from the right.  FAILED as above. */
+SHARED Status solver_meet(Solver *s);
 
 /* follow.c -- the inputs may have been set: switch states are those of now, contacts whose surface went away
  * open, the others go with it; a prescribed motion may have another place and other rates than it went by, and

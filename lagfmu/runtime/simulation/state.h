@@ -60,6 +60,7 @@ typedef struct {
     int between;         /* 1: q and v are still to be taken from dense output at t: solver_arrive() */
     double event_time;   /* [s] of the event found in the step ahead; only if event_count > 0 */
     int event_count;     /* indicators that leave their ranges then */
+    int pending;         /* 1: at t an event has been reached, and its modes are still those before it: solver_meet() */
     double t_old, t_integrator, h_next, error_old; /* of the integrator, when it is ahead */
     int fresh;
     Choice choice;       /* of the method `auto` */
