@@ -22,6 +22,8 @@ FLAGS = (
     "--disable-sync",
 )
 
+SLOW = "GPU stall due to ReadPixels"  # of WebGL in software: who takes a picture of it waits
+
 
 def program() -> str | None:
     """The browser's path: $CHROMIUM, or what is on the path."""
@@ -42,17 +44,24 @@ def chromium() -> Iterator[Any]:
 
 
 class Page:
-    """One page of a browser, opened from disk with the network off; keeps what went wrong."""
+    """One page of a browser, opened from disk with the network off, after a `script` if there is one; keeps
+    what went wrong."""
 
-    def __init__(self, browser: Any, path: Any, **options: Any) -> None:
+    def __init__(self, browser: Any, path: Any, script: str = "", **options: Any) -> None:
         self.context = browser.new_context(offline=True, **options)
+        if script:
+            self.context.add_init_script(script)
         self.tab = self.context.new_page()
         self.tab.set_default_timeout(8000)
         self.problems: list[str] = []
         self.requests: list[str] = []
         self.tab.on(
             "console",
-            lambda m: self.problems.append(m.text) if m.type in ("error", "warning") else None,
+            lambda m: (
+                self.problems.append(m.text)
+                if m.type in ("error", "warning") and SLOW not in m.text
+                else None
+            ),
         )
         self.tab.on("pageerror", lambda error: self.problems.append(str(error)))
         self.tab.on("request", lambda request: self.requests.append(request.url))

@@ -39,7 +39,7 @@ SMALL = """() => [...document.querySelectorAll("input, select, button, summary")
 
 
 @pytest.mark.parametrize("screen", [PHONE, LYING], ids=["upright", "lying"])
-@pytest.mark.parametrize("name", ["Hemisphere", "SliderCrank"])
+@pytest.mark.parametrize("name", ["Hemisphere", "SliderCrank", "Gyroscope"])
 def test_who_moves_a_slider_sees_the_motion(name: str, screen: Any, opened: Opened) -> None:
     """On a phone, whichever slider has the focus: it, the whole picture, a curve and the time are on the
     screen together, and nothing lies over them."""
@@ -87,10 +87,10 @@ def test_no_label_stands_on_a_body(name: str, opened: Opened) -> None:
     assert page.tab.evaluate(COVERED) == []
 
 
-@pytest.mark.parametrize("width", [390, 1280])
-def test_a_finger_meets_every_control(width: int, opened: Opened) -> None:
+@pytest.mark.parametrize(("name", "width"), [("Belt", 390), ("Belt", 1280), ("Gyroscope", 390)])
+def test_a_finger_meets_every_control(name: str, width: int, opened: Opened) -> None:
     """Each is 24 pixels high and wide at least (WCAG 2.2, 2.5.8); of a box to tick its label counts."""
-    page = opened("Belt", viewport={"width": width, "height": 844})
+    page = opened(name, viewport={"width": width, "height": 844})
     page.until("lagfmu.runs")
     page.tab.evaluate(UNFOLD)
     assert page.tab.evaluate(SMALL) == []
@@ -161,12 +161,17 @@ def test_one_dot_is_told_from_two(opened: Opened) -> None:
     assert min(found) > 0.75
 
 
-@pytest.mark.parametrize(("width", "theme"), [(390, "light"), (1280, "dark")])
-def test_nothing_of_a_page_keeps_a_reader_out(width: int, theme: str, opened: Opened) -> None:
+@pytest.mark.parametrize(
+    ("name", "width", "theme"),
+    [("Belt", 390, "light"), ("Belt", 1280, "dark"), ("Gyroscope", 390, "dark")],
+)
+def test_nothing_of_a_page_keeps_a_reader_out(
+    name: str, width: int, theme: str, opened: Opened
+) -> None:
     """axe-core finds nothing in the live page, everything unfolded and drawn: headings in order, contrast,
     names, sizes."""
     page = opened(
-        "Belt", viewport={"width": width, "height": 844}, color_scheme=theme, bypass_csp=True
+        name, viewport={"width": width, "height": 844}, color_scheme=theme, bypass_csp=True
     )
     page.until("lagfmu.runs")
     page.tab.evaluate(UNFOLD)

@@ -208,6 +208,9 @@ def test_the_arrow_is_as_long_as_the_force(opened: Callable[..., Page]) -> None:
     assert not shaft.is_visible()
 
 
+NO_WEBGL = "HTMLCanvasElement.prototype.getContext = ((get) => function (kind, ...more) {"
+NO_WEBGL += " return kind === '2d' ? get.call(this, kind, ...more) : null; }"
+NO_WEBGL += ")(HTMLCanvasElement.prototype.getContext);"
 AXIS = 26  # pixels
 AXES = """() => {
     const names = [...document.querySelectorAll("#picture .axis-name")].map((e) => e.textContent);
@@ -218,9 +221,9 @@ AXES = """() => {
 }"""
 
 
-def test_a_picture_in_space_is_projected(tmp_path: Path, browser: Any) -> None:
+def test_without_webgl_a_picture_in_space_is_projected(tmp_path: Path, browser: Any) -> None:
     """A spherical pendulum: z stays upward on the screen as the view is turned, and so does its axis in the
-    corner; those of x and y turn."""
+    corner; those of x and y turn.  The page says that it is flat."""
 
     z = dynamicsymbols("z")
     m, g = sp.symbols("m g", positive=True)
@@ -240,8 +243,10 @@ def test_a_picture_in_space_is_projected(tmp_path: Path, browser: Any) -> None:
     )
     out = tmp_path / "spherical.html"
     out.write_text(render(playable_of(prepare(model, Scene("Spherical")))), encoding="utf-8")
-    page = Page(browser, out)
-    page.until("lagfmu.runs")
+    page = Page(browser, out, script=NO_WEBGL)
+    page.until("lagfmu.runs && lagfmu.view === 'flat'")
+    assert "WebGL" in page.tab.locator("#flat-note").inner_text()
+    assert not page.tab.locator("#nearer").is_visible()
     places, axes = [], []
     for angle in (-60, 30):
         page.tab.evaluate(

@@ -33,15 +33,18 @@ APPLICATION = (
     "expression.js",
     "labels.js",
     "solids.js",
+    "flat.js",
     "picture.js",
     "player.js",
     "accuracy.js",
     "main.js",
 )
+IN_SPACE = ("space.js", "orbit.js")  # before the last, if the picture is in space
 WORKER = ("fmu.js", "worker.js")
 COMMENT = re.compile(r"^[ \t]*/\*.*?\*/[ \t]*\n", re.MULTILINE | re.DOTALL)
 INDENTATION = re.compile(r"^[ \t]+", re.MULTILINE)
 LIBRARY, LIBRARY_STYLE, LICENCE = "uPlot.iife.min.js", "uPlot.min.css", "uPlot.LICENSE"
+SPACE, SPACE_LICENCE = "three.min.js", "three.LICENSE"
 
 
 @dataclass(frozen=True)
@@ -62,21 +65,31 @@ class Playable:
 
 def render(playable: Playable) -> str:
     """The HTML text; the same for the same parts."""
-    application = _script(_joined(APPLICATION))
+    picture = playable.facts["picture"]
+    in_space = picture is not None and picture["dimensions"] == 3
+    *parts, main = APPLICATION
+    application = _script(_joined((*parts, *(IN_SPACE if in_space else ()), main)))
     library = _script(f"/*\n{_text('vendor', LICENCE)}*/\n{_text('vendor', LIBRARY)}")
+    style = _text("vendor", LIBRARY_STYLE) + _lean(_text("page.css"))
+    scripts = [library, application]
+    if in_space:
+        library = _script(f"/* three.js\n{_text('vendor', SPACE_LICENCE)}*/\n{library}")
+        scripts = [library, application, _text("vendor", SPACE)]
+        style += _lean(_text("space.css"))
     return template("live/web/page.html.j2").render(
         name=playable.name,
         description=playable.facts["description"],
         equations=playable.equations,
-        picture=playable.facts["picture"] is not None,
+        picture=picture is not None,
+        space=_packed(_text("vendor", SPACE).encode()) if in_space else "",
         facts=as_json(lean(playable.facts)),
         module=_packed(playable.module),
         recording=_packed(playable.recording),
-        style=Markup(_text("vendor", LIBRARY_STYLE) + _lean(_text("page.css"))),
+        style=Markup(style),
         library=Markup(library),
         application=Markup(application),
         worker=_packed(_joined(WORKER).encode()),
-        hashes=" ".join(f"'sha256-{_hash(text)}'" for text in (library, application)),
+        hashes=" ".join(f"'sha256-{_hash(text)}'" for text in scripts),
     )
 
 

@@ -66,7 +66,7 @@ OPERATIONS: Mapping[str, Callable[..., Any]] = {
     **{name: getattr(np, name) for name in ("exp", "log", "sign", "abs")},
     **{"asin": np.arcsin, "acos": np.arccos, "atan": np.arctan, "atan2": np.arctan2},
     "spline": _spline,
-    "attitude": lambda i, j, *e: element(int(i), int(j), e),
+    "attitude": lambda i, j, *e: element(int(i), int(j), e) / sum(x**2 for x in e),
     **{"min": lambda *x: np.minimum.reduce(x), "max": lambda *x: np.maximum.reduce(x)},
 }
 FIELDS = {  # kind -> names of its points, lists of points, single expressions, and the rest

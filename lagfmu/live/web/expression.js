@@ -15,11 +15,13 @@ function spline(x, periodic, ...rows) {
   return s < 0 ? c0 + s * c1 : c0 + s * (c1 + s * (c2 + s * c3));
 }
 
-/* An element of the rotation matrix of a unit quaternion (model/attitude.py). */
+/* An element of the rotation matrix of a quaternion (model/attitude.py), which between two rows is no longer
+ * of norm 1. */
 function attitude(i, j, e0, ...e) {
-  if (i === j) return e.reduce((sum, x, k) => sum + (k === i ? x * x : -x * x), e0 * e0);
+  const norm = e.reduce((sum, x) => sum + x * x, e0 * e0);
+  if (i === j) return e.reduce((sum, x, k) => sum + (k === i ? x * x : -x * x), e0 * e0) / norm;
   const sign = (i + 1) % 3 === j ? 1 : -1;
-  return 2 * (e[i] * e[j] - sign * e0 * e[3 - i - j]);
+  return (2 * (e[i] * e[j] - sign * e0 * e[3 - i - j])) / norm;
 }
 
 const OPERATIONS = {

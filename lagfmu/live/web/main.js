@@ -200,19 +200,17 @@ byId("reset").addEventListener("click", () => {
   changed();
 });
 byId("values-box").addEventListener("toggle", () => showTime(player.t));
-if (picture) {
-  new ResizeObserver(() => {
-    if (!trajectory) return;
-    picture.fit();
-    picture.now(player.t);
-  }).observe(byId("picture"));
-  const turn = byId("turn");
-  turn.closest("label").hidden = !picture.space;
-  turn.addEventListener("input", () => {
-    picture.azimuth = (turn.valueAsNumber * Math.PI) / 180;
-    picture.show(trajectory);
-    picture.now(player.t);
-  });
+function redraw() {
+  if (!trajectory) return;
+  picture.fit();
+  picture.now(player.t);
+}
+
+if (picture) new ResizeObserver(redraw).observe(byId("picture"));
+if (picture && picture.inSpace) {
+  new Orbit(picture, () => (picture.scene ? trajectory && picture.now(player.t) : redraw()));
+  openSpace(picture, redraw).then((opened) => (window.lagfmu.view = opened ? "space" : "flat"));
+  window.lagfmu.drawn = () => (picture.scene ? picture.scene.drawn() : []);
 }
 
 /* For scripts: what the page shows now. */

@@ -1,255 +1,20 @@
-/* picture.js -- the mechanism at a time: the model's shapes as SVG, forces of constraint as arrows. */
+/* picture.js -- the mechanism at a time: flat as SVG, or in space on a canvas below the SVG (space.js), which
+ * then holds but the names of the forces and the axes. */
 
-const SVG = "http://www.w3.org/2000/svg";
-const SAMPLES = 120; // points of a path; rows that the view is fitted to
-const HANGING = 24; // pieces of a slack string
-const HALVINGS = 20; // until its length is found, to a millionth
+const ROWS = 120; // that the view is fitted to
 const MARGIN = 16;
 const AXES = 26; // CSS pixels: the axes of a picture in space
-const PIVOT = 7; // half the length of a joint's axis
 const LONGEST = 0.22; // of the view: the arrow of the largest force
-
-function svg(tag, attributes = {}) {
-  const made = document.createElementNS(SVG, tag);
-  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
-  return made;
-}
-
-const pointsOf = (list) => list.map(([x, y]) => `${x.toFixed(2)},${y.toFixed(2)}`).join(" ");
-
-/* Each kind: `points` gives what must be in view, in the world; `draw` sets its elements on the screen, and
- * returns circles that cover it, where no label shall stand. */
-const SHAPES = {
-  line: {
-    make: () => [svg("polyline", { class: "line" })],
-    points: (s, look) => [...s.points.map((p) => p(look)), ...lowest(s, look)],
-    draw: ([line], s, look, view) => drawn(line, linePoints(s, look).map(view.screen)),
-  },
-  rod: {
-    make: (s) =>
-      s.radius !== undefined
-        ? [svg("path", { class: "solid" })]
-        : [
-            svg("line", { class: "rod" }),
-            svg("circle", { class: "joint", r: 3.5 }),
-            svg("circle", { class: "joint", r: 3.5 }),
-          ],
-    points: (s, look) => (s.radius ? rodFaces(s, look).flat() : s.points.map((p) => p(look))),
-    draw([bar, ...joints], s, look, view) {
-      if (s.radius) return drawnSolid(bar, rodFaces(s, look), view);
-      const ends = s.points.map((p) => view.screen(p(look)));
-      setLine(bar, ends[0], ends[1]);
-      joints.forEach((joint, k) => setCenter(joint, ends[k]));
-      return covered(ends, 5);
-    },
-  },
-  spring: {
-    make: () => [svg("polyline", { class: "spring" })],
-    points: (s, look) => s.points.map((p) => p(look)),
-    draw([line], s, look, view) {
-      const [a, b] = s.points.map((p) => view.screen(p(look)));
-      const [dx, dy] = [b[0] - a[0], b[1] - a[1]];
-      const length = Math.hypot(dx, dy) || 1;
-      const [nx, ny] = [(-dy / length) * 6, (dx / length) * 6];
-      const turns = 2 * s.coils;
-      const found = [a];
-      for (let k = 0; k <= turns; k++) {
-        const part = 0.12 + (0.76 * k) / turns;
-        const side = k === 0 || k === turns ? 0 : k % 2 ? 1 : -1;
-        found.push([a[0] + part * dx + side * nx, a[1] + part * dy + side * ny]);
-      }
-      drawn(line, [...found, b]);
-      return covered([a, b], 8);
-    },
-  },
-  disk: {
-    make: (s) => [
-      svg("polyline", { class: "trace" }),
-      svg("circle", { class: s.radius ? "disk" : "particle", r: 6 }),
-      svg("line", { class: "spoke" }),
-    ],
-    points(s, look) {
-      const c = s.center(look);
-      const r = s.radius ? s.radius(look) : 0;
-      return [c.map((x) => x - r), c.map((x) => x + r)];
-    },
-    draw([trace, circle, spoke], s, look, view) {
-      const c = view.screen(s.center(look));
-      setCenter(circle, c);
-      const r = s.radius ? Math.abs(s.radius(look)) * view.scale : 6;
-      circle.setAttribute("r", r);
-      if (s.angle && s.radius) {
-        const a = s.angle(look);
-        setLine(spoke, c, [c[0] + r * Math.cos(a), c[1] - r * Math.sin(a)]);
-      }
-      if (s.trace) drawn(trace, view.past(s.center).map(view.screen));
-      return [[...c, r + 1]];
-    },
-  },
-  box: {
-    make: () => [svg("path", { class: "solid" })],
-    points: (s, look) => boxFaces(s, look).flat(),
-    draw: ([path], s, look, view) => drawnSolid(path, boxFaces(s, look), view),
-  },
-  pivot: {
-    make: (s) => [
-      isLong(s) ? svg("line", { class: "pivot" }) : svg("circle", { class: "joint", r: 4 }),
-    ],
-    points: (s, look) => [s.at(look)],
-    draw([mark], s, look, view) {
-      const at = view.screen(s.at(look));
-      if (isLong(s)) {
-        const [x, y] = view.flat(s.axis(look)).map((c) => c * PIVOT);
-        setLine(mark, [at[0] - x, at[1] + y], [at[0] + x, at[1] - y]);
-      } else setCenter(mark, at);
-      return [[...at, PIVOT]];
-    },
-  },
-  ground: {
-    make: () => [svg("line", { class: "ground" }), svg("path", { class: "hatch" })],
-    points: (s, look) => s.points.map((p) => p(look)),
-    draw([line, hatch], s, look, view) {
-      const [a, b] = s.points.map((p) => view.screen(p(look)));
-      setLine(line, a, b);
-      const length = Math.hypot(b[0] - a[0], b[1] - a[1]) || 1;
-      const [tx, ty] = [(b[0] - a[0]) / length, (b[1] - a[1]) / length];
-      const strokes = [];
-      for (let d = 4; d < length; d += 9) {
-        const [x, y] = [a[0] + d * tx, a[1] + d * ty];
-        const [ex, ey] = [x - 7 * tx - 7 * ty, y - 7 * ty + 7 * tx];
-        strokes.push(`M${x.toFixed(1)} ${y.toFixed(1)}L${ex.toFixed(1)} ${ey.toFixed(1)}`);
-      }
-      hatch.setAttribute("d", strokes.join(""));
-      return covered([a, b], 5);
-    },
-  },
-  path: {
-    make: () => [svg("polyline", { class: "path" })],
-    points: (s, look) => pathPoints(s, look),
-    draw: ([line], s, look, view) => drawn(line, pathPoints(s, look).map(view.screen)),
-  },
-  arrow: {
-    make: () => [
-      svg("line", { class: "arrow" }),
-      svg("polygon", { class: "head" }),
-      svg("text", { class: "force" }),
-    ],
-    points: (s, look) => [s.at(look)],
-    draw([shaft, head, label], s, look, view) {
-      const force = s.vector(look);
-      const size = Math.hypot(...force);
-      const from = view.screen(s.at(look));
-      const flat = view.flat(force).map((x) => (x * view.reach) / view.strongest);
-      const to = [from[0] + flat[0], from[1] - flat[1]];
-      const length = Math.hypot(to[0] - from[0], to[1] - from[1]);
-      const seen = Number.isFinite(length) && length > 1.5;
-      for (const part of [shaft, head, label]) part.style.display = seen ? "" : "none";
-      if (!seen) return [];
-      const [tx, ty] = [(to[0] - from[0]) / length, (to[1] - from[1]) / length];
-      const tip = Math.min(9, length);
-      const base = [to[0] - tip * tx, to[1] - tip * ty];
-      setLine(shaft, from, base);
-      const side = tip * 0.45;
-      drawn(head, [to, [base[0] - side * ty, base[1] + side * tx], [base[0] + side * ty, base[1] - side * tx]]);
-      label.textContent = `${s.name} ${withUnit(size, "N", 3)}`;
-      view.arrows.push({ from, to, label });
-      return [];
-    },
-  },
-};
-
-/* Draws a way of points on the screen. */
-function drawn(line, points) {
-  line.setAttribute("points", pointsOf(points));
-  return covered(points);
-}
-
-function drawnSolid(path, faces, view) {
-  const seen = faces.map((face) => face.map(view.screen));
-  path.setAttribute("d", solidPath(seen));
-  return [];
-}
-
-const isLong = (pivot) => Boolean(pivot.axis) && pivot.of !== "plate";
-
-function setLine(line, [x1, y1], [x2, y2]) {
-  for (const [key, value] of Object.entries({ x1, y1, x2, y2 })) line.setAttribute(key, value);
-}
-
-function setCenter(circle, [cx, cy]) {
-  circle.setAttribute("cx", cx);
-  circle.setAttribute("cy", cy);
-}
-
-/* Points from a to b that hang by `sag` in the middle: a parabola. */
-function hanging(a, b, sag) {
-  const up = a.length - 1;
-  return Array.from({ length: HANGING + 1 }, (_, k) => {
-    const part = k / HANGING;
-    const drop = 4 * sag * part * (1 - part);
-    return a.map((x, i) => x + part * (b[i] - x) - (i === up ? drop : 0));
-  });
-}
-
-const between = (a, b) => Math.hypot(...a.map((x, i) => b[i] - x));
-
-/* A point that no string of that length between its ends hangs below: the tip of two straight halves. */
-function lowest(s, look) {
-  if (!s.length) return [];
-  const [a, b] = s.points.map((p) => p(look));
-  const slack = s.length(look) ** 2 - between(a, b) ** 2;
-  return slack > 0 ? hanging(a, b, Math.sqrt(slack) / 2).slice(HANGING / 2, HANGING / 2 + 1) : [];
-}
-
-/* A string that is longer than the way between its ends hangs, and keeps its length (so in cli/film.py). */
-function linePoints(s, look) {
-  const ends = s.points.map((p) => p(look));
-  if (!s.length) return ends;
-  const [a, b] = ends;
-  const length = s.length(look);
-  if (!(length > between(a, b))) return ends;
-  let [low, high] = [0, length];
-  for (let k = 0; k < HALVINGS; k++) {
-    const sag = (low + high) / 2;
-    const found = hanging(a, b, sag);
-    const long = found.reduce((sum, p, i) => (i ? sum + between(found[i - 1], p) : 0), 0);
-    if (long < length) low = sag;
-    else high = sag;
-  }
-  return hanging(a, b, low);
-}
-
-function pathPoints(s, look) {
-  const [low, high] = s.range.map((f) => f(look));
-  const found = [];
-  for (let k = 0; k <= SAMPLES; k++) {
-    const value = low + ((high - low) * k) / SAMPLES;
-    found.push(s.point((name) => (name === s.over ? value : look(name))));
-  }
-  return found;
-}
-
-const compiledPoint = (point) => {
-  const parts = point.map(compiled);
-  return (look) => parts.map((f) => f(look));
-};
-
-function compiledShape(s) {
-  const found = { ...s };
-  if (s.points) found.points = s.points.map(compiledPoint);
-  if (s.axes) found.axes = s.axes.map(compiledPoint);
-  for (const key of ["center", "size", "at", "axis", "point", "vector"]) if (s[key]) found[key] = compiledPoint(s[key]);
-  for (const key of ["radius", "angle", "length"]) if (s[key] !== undefined) found[key] = compiled(s[key]);
-  if (s.range) found.range = s.range.map(compiled);
-  return found;
-}
+const AZIMUTH = -1.05; // rad: from where a picture in space is seen at first
+const ELEVATION = 0.42;
 
 class Picture {
   constructor(root, facts) {
     this.root = root;
-    this.space = facts.dimensions === 3;
-    this.azimuth = -1.05;
-    this.elevation = 0.42;
+    this.inSpace = facts.dimensions === 3;
+    this.scene = null; // of space.js, where there is WebGL
+    this.azimuth = AZIMUTH;
+    this.elevation = ELEVATION;
     this.shapes = facts.shapes
       .filter((s) => s.kind in SHAPES)
       .map((s) => {
@@ -260,7 +25,7 @@ class Picture {
       });
     for (const { parts, shape } of this.shapes) if (shape.kind === "arrow") root.append(...parts);
     const named = facts.shapes.filter((s) => s.kind === "direction");
-    this.axes = this.space ? this.makeAxes(named.map(compiledShape)) : [];
+    this.axes = this.inSpace ? this.makeAxes(named.map(compiledShape)) : [];
     this.screen = this.screen.bind(this);
     this.flat = this.flat.bind(this);
     this.past = this.past.bind(this);
@@ -268,7 +33,7 @@ class Picture {
 
   /* A vector of the world in the plane of the screen, y up. */
   flat(v) {
-    if (!this.space) return [v[0], v[1]];
+    if (!this.inSpace) return [v[0], v[1]];
     const [x, y, z] = v;
     const { azimuth: a, elevation: e } = this;
     const depth = x * Math.cos(a) + y * Math.sin(a);
@@ -276,8 +41,17 @@ class Picture {
   }
 
   screen(p) {
+    if (this.scene) return this.scene.screen(p);
     const [x, y] = this.flat(p);
     return [this.left + (x - this.low[0]) * this.scale, this.bottom - (y - this.low[1]) * this.scale];
+  }
+
+  /* Where the arrow of a force [N] at a point ends on the screen. */
+  tip(at, force) {
+    if (this.scene) return this.scene.screen(at.map((x, i) => x + force[i] * this.scene.perNewton));
+    const [x, y] = this.screen(at);
+    const [right, up] = this.flat(force).map((f) => (f * this.reach) / this.strongest);
+    return [x + right, y - up];
   }
 
   look(place) {
@@ -288,62 +62,60 @@ class Picture {
   /* Fits the view to the whole run, and the arrows to its largest force. */
   show(trajectory) {
     this.trajectory = trajectory;
-    const low = [Infinity, Infinity];
-    const high = [-Infinity, -Infinity];
-    this.forces = []; // [foot, vector] in the plane that is seen
-    const forces = new Map();
-    const stride = Math.max(1, Math.floor(trajectory.time.length / SAMPLES));
+    this.points = []; // what must be in view, in the world
+    this.forces = []; // [foot, vector]
+    const sizes = new Map();
+    const stride = Math.max(1, Math.floor(trajectory.time.length / ROWS));
     for (let row = 0; row < trajectory.time.length; row += stride) {
       const look = this.look([row, 0]);
       for (const { shape, kind } of this.shapes) {
         if (shape.kind === "arrow") {
-          const size = Math.hypot(...shape.vector(look));
-          if (size > 0) forces.set(shape, [...(forces.get(shape) || []), size]);
-          this.forces.push([this.flat(shape.at(look)), this.flat(shape.vector(look))]);
+          const force = shape.vector(look);
+          const size = Math.hypot(...force);
+          if (size > 0) sizes.set(shape, [...(sizes.get(shape) || []), size]);
+          this.forces.push([shape.at(look), force]);
         }
         if (shape.kind === "path" && row > 0 && !shape.moves) continue;
-        for (const p of kind.points(shape, look)) {
-          const [x, y] = this.flat(p);
-          if (!Number.isFinite(x) || !Number.isFinite(y)) continue;
-          low[0] = Math.min(low[0], x);
-          low[1] = Math.min(low[1], y);
-          high[0] = Math.max(high[0], x);
-          high[1] = Math.max(high[1], y);
-        }
+        this.points.push(...kind.points(shape, look).filter((p) => p.every(Number.isFinite)));
       }
     }
     let strongest = 0;
-    for (const sizes of forces.values()) {
-      sizes.sort((a, b) => a - b);
-      strongest = Math.max(strongest, sizes[Math.floor(0.98 * (sizes.length - 1))]); // not a spike
+    for (const found of sizes.values()) {
+      found.sort((a, b) => a - b);
+      strongest = Math.max(strongest, found[Math.floor(0.98 * (found.length - 1))]); // not a spike
     }
     this.strongest = strongest || 1;
-    this.low = Number.isFinite(low[0]) ? low : [0, 0];
-    this.high = Number.isFinite(high[0]) ? high : [1, 1];
     this.fit();
   }
 
+  /* To the size of its element, and where it is flat to the direction from which it is seen. */
   fit() {
     const { width, height } = this.root.getBoundingClientRect();
     this.width = Math.max(width, 100);
     this.height = Math.max(height, 100);
     this.root.setAttribute("viewBox", `0 0 ${this.width} ${this.height}`);
+    if (this.scene) {
+      this.scene.fit(this);
+      return;
+    }
+    [this.low, this.high] = extent(this.points.map(this.flat), 2);
     this.reach = LONGEST * Math.min(this.width, this.height);
     const [w, h] = [this.high[0] - this.low[0], this.high[1] - this.low[1]];
+    const pushes = this.forces.map(([foot, vector]) => [this.flat(foot), this.flat(vector)]);
     const room = [0, 0, 0, 0]; // that arrows need besides: left, right, below, above
     for (let turn = 0; turn < 3; turn++) {
       const across = (this.width - 2 * MARGIN - room[0] - room[1]) / (w || 1e-9);
       const up = (this.height - 2 * MARGIN - room[2] - room[3]) / (h || 1e-9);
       this.scale = w === 0 && h === 0 ? 1 : Math.min(across, up, 1e9);
-      this.makeRoom(room, [w * this.scale, h * this.scale]);
+      this.makeRoom(pushes, room, [w * this.scale, h * this.scale]);
     }
     this.left = (this.width - w * this.scale + room[0] - room[1]) / 2;
     this.bottom = (this.height + h * this.scale - room[2] + room[3]) / 2;
   }
 
   /* How far arrows reach beyond the bodies [CSS pixels]; one that is longer than it should be is a spike. */
-  makeRoom(room, size) {
-    for (const [foot, vector] of this.forces) {
+  makeRoom(pushes, room, size) {
+    for (const [foot, vector] of pushes) {
       const long = Math.min(1, this.strongest / Math.hypot(...vector)) * (this.reach / this.strongest);
       for (const i of [0, 1]) {
         const tip = (foot[i] - this.low[i]) * this.scale + vector[i] * long;
@@ -381,7 +153,7 @@ class Picture {
   past(center) {
     const found = [];
     const last = this.placed[0];
-    const stride = Math.max(1, Math.floor(last / (4 * SAMPLES)));
+    const stride = Math.max(1, Math.floor(last / (4 * ROWS)));
     for (let row = 0; row <= last; row += stride) found.push(center(this.look([row, 0])));
     found.push(center(this.look(this.placed)));
     return found;
@@ -391,8 +163,27 @@ class Picture {
     this.placed = this.trajectory.place(t);
     this.arrows = [];
     const look = this.look(this.placed);
-    const bodies = this.shapes.flatMap(({ shape, kind, parts }) => kind.draw(parts, shape, look, this));
+    if (this.scene) this.scene.draw(look, this);
+    const bodies = this.shapes.flatMap(({ shape, kind, parts }) =>
+      this.scene && shape.kind !== "arrow"
+        ? covered(kind.points(shape, look).map(this.screen))
+        : kind.draw(parts, shape, look, this)
+    );
     this.drawAxes(look);
     placeLabels(this.arrows, bodies, this.width, this.height);
   }
+}
+
+/* The least and the largest of each of n coordinates; 0 and 1 of no points. */
+function extent(points, n) {
+  if (!points.length) return [Array(n).fill(0), Array(n).fill(1)];
+  const low = Array(n).fill(Infinity);
+  const high = Array(n).fill(-Infinity);
+  for (const p of points) {
+    for (let i = 0; i < n; i++) {
+      low[i] = Math.min(low[i], p[i]);
+      high[i] = Math.max(high[i], p[i]);
+    }
+  }
+  return [low, high];
 }

@@ -1,0 +1,201 @@
+"""The page of a mechanism in space: what three.js draws is what the FMU says, and how the view is moved."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from browser import Page
+
+Drawn = dict[str, Any]
+TO = """(part) => {
+    const scrub = document.getElementById("scrub");
+    scrub.value = part * scrub.max;
+    scrub.dispatchEvent(new Event("input"));
+    return Number(scrub.value);
+}"""
+PIXELS = "() => document.getElementById('space').toDataURL()"
+COLOURS = """() => {
+    const canvas = document.getElementById("space");
+    const copy = new OffscreenCanvas(canvas.width, canvas.height);
+    const context = copy.getContext("2d", { willReadFrequently: true });
+    context.drawImage(canvas, 0, 0);
+    const { data } = context.getImageData(0, 0, canvas.width, canvas.height);
+    const found = new Set();
+    let drawn = 0;
+    for (let i = 0; i < data.length; i += 4) {
+        if (data[i + 3] === 255) drawn += 1;
+        found.add(data[i] * 65536 + data[i + 1] * 256 + data[i + 2]);
+    }
+    return [(4 * drawn) / data.length, found.size];
+}"""
+LOSE = """() => {
+    const context = document.getElementById("space").getContext("webgl2");
+    context.getExtension("WEBGL_lose_context").loseContext();
+}"""
+PINCH = """() => {
+    const root = document.getElementById("picture");
+    root.setPointerCapture = () => {};
+    const at = (type, id, x) =>
+        root.dispatchEvent(new PointerEvent(type, { pointerId: id, clientX: x, clientY: 200, buttons: 1 }));
+    at("pointerdown", 1, 150);
+    at("pointerdown", 2, 250);
+    at("pointermove", 2, 350);
+    at("pointerup", 1, 150);
+    at("pointerup", 2, 350);
+}"""
+
+
+@pytest.fixture(scope="module")
+def page(browser: Any, page_file: Callable[[str], Path]) -> Iterator[Page]:
+    """That of Bennett's linkage; a test that moves the view sets it back."""
+    made = Page(browser, page_file("Bennett"), viewport={"width": 1280, "height": 844})
+    made.until("lagfmu.runs && lagfmu.view")
+    if made.tab.evaluate("lagfmu.view") != "space":
+        pytest.skip("this browser has no WebGL")
+    yield made
+    made.close()
+    assert made.problems == []
+    assert all(r.startswith(("file:", "blob:", "data:")) for r in made.requests)
+
+
+def shapes(page: Page, kind: str) -> list[Any]:
+    """Matrices (4, 4) of the meshes of each shape of a kind."""
+    found = page.tab.evaluate("() => lagfmu.drawn()")
+    return [
+        np.array(s["meshes"]).reshape(-1, 4, 4).swapaxes(1, 2) for s in found if s["kind"] == kind
+    ]
+
+
+def rows(page: Page, part: float) -> Callable[[str], float]:
+    """The FMU's values at a part of the run, where the page is put."""
+    time = page.tab.evaluate(TO, part)
+    run = page.tab.evaluate("() => lagfmu.shown()")
+    k = int(np.argmin(np.abs(np.array(run["time"]) - time)))
+    page.tab.evaluate(TO, run["time"][k] / run["time"][-1])
+    return lambda name: float(run["values"][name][k])
+
+
+def matrix(e: Any) -> Any:
+    """R = 1 + 2 w [v] + 2 [v]^2 of a unit quaternion."""
+    w, (x, y, z) = e[0], e[1:]
+    V = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + 2 * w * V + 2 * V @ V
+
+
+@pytest.mark.parametrize("part", [0.0, 0.3, 1.0])
+def test_a_body_is_drawn_where_the_fmu_has_it(page: Page, part: float) -> None:
+    """The three links are cylinders about their centres of mass, along x of each body and as long as a rod of
+    that inertia; the pins of the hinges are where the joints are, along their axes."""
+    value = rows(page, part)
+    bodies = ("one", "two", "three")
+    positions = {b: np.array([value(f"{b}.position.{x}") for x in "xyz"]) for b in bodies}
+    turns = {b: matrix([value(f"{b}.orientation.{x}") for x in "wxyz"]) for b in bodies}
+    for (rod,), body, length in zip(shapes(page, "rod"), bodies, (0.3, 0.5, 0.3), strict=True):
+        np.testing.assert_allclose(rod[:3, 3], positions[body], rtol=0, atol=1e-6)
+        along = np.sqrt(1 - 0.01) * length * turns[body][:, 0]
+        np.testing.assert_allclose(np.abs(rod[:3, 2] @ along), along @ along, rtol=1e-5)
+        np.testing.assert_allclose(np.linalg.norm(rod[:3, 2]), np.linalg.norm(along), rtol=1e-5)
+    b = shapes(page, "pivot")[1][0]
+    end = positions["one"] + turns["one"] @ [0.15, 0, 0]
+    np.testing.assert_allclose(b[:3, 3], end, rtol=0, atol=1e-6)
+    axis = turns["two"][:, 2]  # of the hinge, in both links
+    np.testing.assert_allclose(np.cross(b[:3, 2], axis), 0, atol=1e-4 * np.linalg.norm(b[:3, 2]))
+
+
+def test_arrows_are_as_long_as_the_forces(page: Page) -> None:
+    """From foot to tip all are one length a newton, at every time, the one that the page tells; forces and
+    directions are those that the second bodies receive."""
+    legend = page.tab.locator("#picture .legend").text_content()
+    square, newtons = (float(w) for w in str(legend).split() if w.replace(".", "").isdigit())
+    for part in (0.2, 0.9):
+        value = rows(page, part)
+        for arrow, joint in zip(shapes(page, "arrow"), "ABCD", strict=True):
+            shaft, _, head, _ = arrow
+            foot = shaft[:3, 3] - shaft[:3, 2] / 2
+            tip = head[:3, 3] + head[:3, 2] / 2
+            size = value(f"force.{joint}.norm") * square / newtons
+            assert np.linalg.norm(tip - foot) == pytest.approx(size, rel=1e-6)
+            if joint == "D":  # its first marker has the ground's axes
+                force = [value(f"force.D.{x}") * square / newtons for x in "xyz"]
+                np.testing.assert_allclose(tip - foot, force, rtol=0, atol=1e-6 * size)
+
+
+def test_something_is_to_be_seen(page: Page) -> None:
+    """Bodies cover a part of the canvas, lit in many shades; at another time it is another picture."""
+    seen = []
+    for part in (0.0, 0.5):
+        page.tab.evaluate(TO, part)
+        covered, colours = page.tab.evaluate(COLOURS)
+        assert 0.005 < covered < 0.9
+        assert colours > 100
+        seen.append(page.tab.evaluate(PIXELS))
+    assert seen[0] != seen[1]
+
+
+MOVES: dict[str, Callable[[Page], Any]] = {
+    "key": lambda page: page.tab.keyboard.press("ArrowLeft"),
+    "key zoom": lambda page: page.tab.keyboard.press("+"),
+    "key shift": lambda page: page.tab.keyboard.press("Shift+ArrowUp"),
+    "wheel": lambda page: page.tab.mouse.wheel(0, -300),
+    "drag": lambda page: dragged(page),
+    "pinch": lambda page: page.tab.evaluate(PINCH),
+    "slider": lambda page: page.tab.locator("#tilt").press("ArrowRight"),
+    "button": lambda page: page.tab.locator("#farther").click(),
+}
+
+
+def dragged(page: Page) -> None:
+    page.tab.mouse.down()
+    page.tab.mouse.move(250, 260, steps=3)
+    page.tab.mouse.up()
+
+
+@pytest.mark.parametrize("move", MOVES)
+def test_the_view_is_moved_and_set_back(page: Page, move: str) -> None:
+    """By keys, wheel, mouse, fingers, sliders and buttons; 0 brings back what was there."""
+    picture = page.tab.locator("#picture")
+    picture.focus()
+    box = picture.bounding_box()
+    page.tab.mouse.move(box["x"] + 150, box["y"] + 100)
+    before = page.tab.evaluate(PIXELS)
+    MOVES[move](page)
+    page.until(f"document.getElementById('space').toDataURL() !== {before!r}")
+    picture.focus()
+    page.tab.keyboard.press("0")
+    page.until(f"document.getElementById('space').toDataURL() === {before!r}")
+
+
+def test_what_is_lost_is_drawn_flat(opened: Callable[..., Page]) -> None:
+    """Where the graphics card takes WebGL away, the flat projection stands in, and the page says so."""
+    page = opened("Gyroscope")
+    page.until("lagfmu.runs && lagfmu.view === 'space'")
+    assert not page.tab.locator("#picture .solid").is_visible()
+    page.tab.evaluate(LOSE)
+    page.until("!document.getElementById('flat-note').hidden")
+    assert page.tab.locator("#picture .solid").is_visible()
+    assert page.tab.locator("#picture .arrow").is_visible()
+
+
+def test_of_three_js_is_there_what_is_used() -> None:
+    """The library is made of the names that the page's script mentions, of no more and no fewer."""
+    web = files("lagfmu").joinpath("live", "web")
+    used = re.findall(r"THREE\.(\w+)", web.joinpath("space.js").read_text(encoding="utf-8"))
+    made = web.joinpath("vendor", "three.js").read_text(encoding="utf-8")
+    lists = re.findall(r"export \{([^}]*)\}", made)
+    assert set(used) == set(re.findall(r"\w+", " ".join(lists)))
+    library = web.joinpath("vendor", "three.min.js").read_text(encoding="utf-8")
+    assert all(f"{name}:()=>" in library for name in used)
+
+
+def test_paper_is_light(page: Page) -> None:
+    """Printed, the picture is on the page, without its controls."""
+    page.tab.emulate_media(media="print")
+    assert page.tab.locator("#space").is_visible()
+    assert not page.tab.locator("#turn").is_visible()
+    page.tab.emulate_media(media="screen")
