@@ -237,7 +237,6 @@ WORLDS: dict[
 SLOW = {
     ("Arm", 1e-8),
     ("Arm", 1e-12),
-    ("Bennett", 1e-12),
 }  # tests/test_rigid_bodies.py has their like
 
 

@@ -79,6 +79,15 @@ def test_redundant_constraints_cost_no_steps(name, pair):
     compare(pair(name), "rk4", 1e-6)
 
 
+def test_a_loop_that_closes_against_the_count_of_freedoms_needs_the_steps_of_its_order(native_fmu):
+    """Bennett's linkage at a 10,000th of the tolerance: a method of order 8 takes 10^(4/8) = 3.2 times the
+    steps (it took 240, by rates of another place where rows are at small angles to each other)."""
+    steps = [
+        simulate(native_fmu("Bennett"), tolerance=tol)["solver.steps"][-1] for tol in (1e-8, 1e-12)
+    ]
+    assert steps[1] < 4 * steps[0]
+
+
 @EACH
 def test_redundant_constraints_cost_no_accuracy(name, pair):
     """Q is what it is without them within two tolerances, at points inside steps too: the angle between rows

@@ -85,5 +85,12 @@ static int basis(Linear *l, int *rows) {
     return w.cod.rank < w.acting;
 }
 
-static const Dependent ALL = {doubles, ints, factor_nullspace, factor_rows, solve_rows, basis};
+/* Of columns of unit norm, the one that stands out least comes last. */
+static double apart(const Linear *l) {
+    const Weighted w = weighted_view(l);
+    const int last = w.cod.rank - 1;
+    return last < 0 ? 1 : fabs(w.cod.A[last * w.cod.rows + last]);
+}
+
+static const Dependent ALL = {doubles, ints, factor_nullspace, factor_rows, solve_rows, basis, apart};
 SHARED_VALUE const Dependent *const DEPENDENT = &ALL;

@@ -18,6 +18,8 @@ typedef struct {
     Status (*solve)(Linear *l, const double *b, const double *c, double *x, double *lambda);
     /* See linear_basis(); of the rung that was factored, whose factors are lost. */
     int (*basis)(Linear *l, int *basis);
+    /* See linear_furthest_apart(); of orthogonal.c. */
+    double (*apart)(const Linear *l);
 } Dependent;
 
 /* orthogonal.c: 1 if M is safely positive definite; clears l->unique where lambda is not.  `doubtful`: rows that

@@ -18,6 +18,7 @@
 #include "ldlt.h"
 
 #include <math.h>
+#include <stddef.h>
 
 /* Row p of L where none of the rows that enter it meet: L_pi = A_pi / D_i. */
 static double forest_row(const Elimination *e, double *L, const double *D, const double *row_size,
@@ -53,11 +54,16 @@ static double general_row(const Elimination *e, double *L, const double *D, cons
     return size + e->overlap[p] * sum;
 }
 
-Definite ldlt_factor(const Elimination *e, double *L, double *D, double *row_size, double *row) {
+Definite ldlt_factor(const Elimination *e, double *L, double *D, double *row_size, double *row, const int *acts) {
     Definite found = {HUGE_VAL, 1, -1};
     double trace = 0;
     for (int p = 0; p < e->size; p++) {
         double diagonal = D[p], pivot = diagonal;
+        if (acts != NULL && !acts[e->order[p]]) {
+            row_size[p] = 1;
+            trace += 1;
+            continue;
+        }
         double size = e->forest ? forest_row(e, L, D, row_size, p, &pivot)
                                 : general_row(e, L, D, row_size, row, p, &pivot);
         if (!(pivot > 0 && pivot < HUGE_VAL)) {

@@ -14,8 +14,10 @@ typedef struct {
 
 /* In place: on entry L holds A's elements below the diagonal in the pattern of L and D its
  * diagonal, in the order of elimination; on return L, and 1 / D.  `row_size` and `row` are scratch
- * (size), `row` zero on entry and return. */
-SHARED Definite ldlt_factor(const Elimination *e, double *L, double *D, double *row_size, double *row);
+ * (size), `row` zero on entry and return.  `acts` (size; NULL: all): 0 for what is passed over, a row of A, by its
+ * own number, that is nothing but a 1 on the diagonal. */
+SHARED Definite ldlt_factor(const Elimination *e, double *L, double *D, double *row_size, double *row,
+                            const int *acts);
 
 /* y <- L^-1 y */
 SHARED void ldlt_forward(const Elimination *e, const double *L, double *y);

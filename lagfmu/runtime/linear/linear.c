@@ -31,7 +31,7 @@ void linear_layout(Linear *l, Arena *arena, const System *s, Why *why) {
     l->system = s;
     l->why = why;
     l->M = l->G = NULL;
-    l->active = NULL;
+    l->active = l->some = NULL;
     l->rung = RUNG_SCHUR;
     l->unique = arena_ints(arena, m);
     l->zero = arena_doubles(arena, n);
@@ -140,6 +140,7 @@ Status linear_factor(Linear *l, const double *M, const double *G, const int *act
         l->unique[k] = 1;
         all &= active[k];
     }
+    l->some = all ? NULL : active;
     if (all && l->system->solve != NULL && !(l->off > 0)) {
         l->rung = RUNG_WRITTEN_OUT; /* it factors and solves at once */
         return OK;
@@ -206,6 +207,14 @@ Status linear_nearest(Linear *l, const double *b, const double *c, double *x, do
 
 double linear_apart(const Linear *l) {
     return l->rung == RUNG_WRITTEN_OUT || l->rung == RUNG_NULLSPACE ? 1 : schur_of(l)->apart;
+}
+
+double linear_furthest_apart(const Linear *l) {
+    return l->rung == RUNG_ORTHOGONAL ? DEPENDENT->apart(l) : linear_apart(l);
+}
+
+int linear_plain(const Linear *l) {
+    return l->rung == RUNG_SCHUR || l->rung == RUNG_WRITTEN_OUT || l->rung == RUNG_NULLSPACE;
 }
 
 int linear_basis(Linear *l, int *basis) {

@@ -29,6 +29,7 @@ typedef struct {
     const System *system;
     const double *M, *G;  /* the values that were factored (not copied: they must stay) */
     const int *active;    /* (m) 1 where a row acts (not copied) */
+    const int *some;      /* the same; NULL where all act */
     Rung rung;
     int *unique;          /* (m) 1 where lambda is determined uniquely; 1 for rows that do not act */
     Why *why;
@@ -74,6 +75,12 @@ SHARED double linear_rank_threshold(const Linear *l);
 /* How far the rows that were factored last are from depending on each other: the least sine of the angle between
  * a row and those eliminated before it, in the metric of M; 1 where nothing has asked for it. */
 SHARED double linear_apart(const Linear *l);
+
+/* The same of rows that do depend on each other, for as many as are independent, those taken that are furthest apart. */
+SHARED double linear_furthest_apart(const Linear *l);
+
+/* 1 if the first rung was safe. */
+SHARED int linear_plain(const Linear *l);
 
 /* 1 if the rows that were factored last depend on each other.  basis (m): then as many of them as are
  * independent, otherwise all.  Factors are lost. */

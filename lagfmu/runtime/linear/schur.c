@@ -4,7 +4,7 @@
  *   S lambda = c - G M^-1 b ,   S = G M^-1 G^T ,   x = M^-1 (b + G^T lambda)
  *
  * in the fixed pattern of the plan, P M P^T = L D L^T, W = L^-1 P G^T, S = W^T D^-1 W = L' D' L'^T.
- * A row that does not act keeps its place with W_k = 0 and S_kk = 1, so that its lambda is 0.
+ * A row that does not act keeps its place with S_kk = 1 alone, and is passed over: its lambda is 0.
  *
  * S squares the ratio of masses, so it is guarded by the bound of ldlt.c on the condition number of
  * M and of S scaled to unit diagonals, which is never below it.  lambda was measured to lose 1e-16
@@ -75,7 +75,7 @@ static int factor_masses(const Plan *plan, Schur *own, const double *M) {
     for (int k = 0; k < e->start[e->size]; k++)
         own->mass_lower[k] = plan->mass_value[k] < 0 ? 0 : M[plan->mass_value[k]];
     Definite found =
-        ldlt_factor(e, own->mass_lower, own->inverse_mass, own->row_size, own->row);
+        ldlt_factor(e, own->mass_lower, own->inverse_mass, own->row_size, own->row, NULL);
     own->condition = found.bound;
     own->growth = found.growth;
     if (found.failed >= 0) own->doubtful_mass = e->order[found.failed];
@@ -120,12 +120,9 @@ int schur_masses(Linear *l, int zero_rows) {
     own->w = plan->diagonal ? l->G : own->w_own;
     for (int k = 0; k < s->m; k++) {
         own->diagonal[k] = 1;
-        if (l->active[k]) {
-            if (!plan->diagonal) eliminate_row(plan, own, l->G, k);
-            own->diagonal[k] = scale_row(own, k);
-        } else {
-            for (int a = own->w_start[k]; a < own->w_start[k + 1]; a++) own->h[a] = 0;
-        }
+        if (!l->active[k]) continue;
+        if (!plan->diagonal) eliminate_row(plan, own, l->G, k);
+        own->diagonal[k] = scale_row(own, k);
         if (own->diagonal[k] > 0 && own->diagonal[k] <= DBL_MAX) continue;
         own->doubtful_row = k;
         if (!(own->diagonal[k] == 0 && zero_rows)) return 0;
@@ -134,13 +131,14 @@ int schur_masses(Linear *l, int zero_rows) {
 }
 
 /* S below the diagonal, and its diagonal, in the order of elimination. */
-static void assemble(const Plan *plan, Schur *own, const int *active) {
+static void assemble(const Plan *plan, Schur *own, const int *acts) {
     const Elimination *e = &plan->schur;
     for (int p = 0; p < e->size; p++) {
+        const int there = acts == NULL || acts[e->order[p]];
         own->inverse[p] = own->diagonal[e->order[p]];
         for (int k = e->start[p]; k < e->start[p + 1]; k++) {
             double sum = 0;
-            if (active[e->order[p]])
+            if (there && (acts == NULL || acts[e->order[e->column[k]]]))
                 for (int a = plan->pair_start[k]; a < plan->pair_start[k + 1]; a++)
                     sum += own->w[plan->pair_a[a]] * own->h[plan->pair_b[a]];
             own->lower[k] = sum;
@@ -165,9 +163,9 @@ int schur_factor(Linear *l) {
     own->apart = 1;
     if (!schur_masses(l, 0)) return 0;
     if (l->system->m > 0) {
-        assemble(plan, own, l->active);
+        assemble(plan, own, l->some);
         Definite found =
-            ldlt_factor(&plan->schur, own->lower, own->inverse, own->row_size, own->row);
+            ldlt_factor(&plan->schur, own->lower, own->inverse, own->row_size, own->row, l->some);
         if (found.failed >= 0) own->doubtful_row = plan->schur.order[found.failed];
         own->condition = larger(own->condition, found.bound);
         own->growth = larger(own->growth, found.growth);
@@ -207,18 +205,18 @@ static void constrain(const Linear *l, const double *c, double *y, double *lambd
     double *z = own->z;
     for (int p = 0; p < e->size; p++) { /* L' z = c - W^T y */
         int k = e->order[p];
-        double sum = 0;
-        if (l->active[k]) {
-            sum = c[k];
-            for (int a = own->w_start[k]; a < own->w_start[k + 1]; a++)
-                sum -= own->w[a] * y[own->w_column[a]];
-        }
+        z[p] = 0;
+        if (!l->active[k]) continue;
+        double sum = c[k];
+        for (int a = own->w_start[k]; a < own->w_start[k + 1]; a++) sum -= own->w[a] * y[own->w_column[a]];
         for (int a = e->start[p]; a < e->start[p + 1]; a++) sum -= own->lower[a] * z[e->column[a]];
         z[p] = sum;
     }
     for (int p = 0; p < e->size; p++) z[p] *= own->inverse[p];
     for (int p = e->size - 1; p >= 0; p--) { /* L'^T lambda = D'^-1 z */
         int k = e->order[p];
+        lambda[k] = 0;
+        if (l->some != NULL && !l->some[k]) continue;
         for (int a = e->start[p]; a < e->start[p + 1]; a++) z[e->column[a]] -= own->lower[a] * z[p];
         for (int a = own->w_start[k]; a < own->w_start[k + 1]; a++)
             y[own->w_column[a]] += own->h[a] * z[p];

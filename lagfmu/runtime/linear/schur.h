@@ -20,7 +20,7 @@ typedef struct {
     const int *w_start, *w_column;
     const double *w;           /* W = L^-1 P G^T by rows of G; if M is diagonal that is G itself */
     double *w_own;             /* the same where M is not diagonal */
-    double *h;                 /* D^-1 W; 0 in rows that do not act */
+    double *h;                 /* D^-1 W of rows that act */
     double *lower, *inverse;   /* S = L' D' L'^T: L' and 1 / D' (m) */
     double *diagonal;          /* (m) S_kk by rows of G; 1 where a row does not act */
     double *row_size, *row;    /* (max(nv, m)) scratch of ldlt.c; row is zero between calls */

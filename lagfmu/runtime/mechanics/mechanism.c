@@ -7,11 +7,14 @@
 
 #include "digits.h"
 
+static const double AGREES = 1e-11; /* what rounding leaves of rows that follow from others, relative to its terms */
+
 void mechanism_layout(Mechanism *b, Arena *arena, const System *s, Why *why,
                       const Sliding *sliding) {
     b->system = s;
     b->why = why;
     b->dependent = b->stage = 0;
+    b->basis = NULL;
     b->M = arena_doubles(arena, s->masses);
     b->F = arena_doubles(arena, s->nv);
     b->G = arena_doubles(arena, s->entries);
@@ -21,8 +24,11 @@ void mechanism_layout(Mechanism *b, Arena *arena, const System *s, Why *why,
     b->lambda = arena_doubles(arena, s->m);
     b->f = arena_doubles(arena, s->m);
     b->dq = arena_doubles(arena, s->nv);
+    b->reach = arena_doubles(arena, s->nv);
+    b->place = arena_doubles(arena, s->nv);
     b->trial = arena_doubles(arena, s->nq);
     b->fixed = arena_ints(arena, s->m);
+    b->pulls = arena_ints(arena, s->m);
     if (s->kinematics != NULL) KINEMATICS->layout(b, arena);
     linear_layout(&b->linear, arena, s, why);
     b->sliding = s->frictions > 0 ? sliding : NULL;
@@ -92,6 +98,25 @@ Status mechanism_motion(Mechanism *b, Instant at, const double *q, const double 
     return FAILED;
 }
 
+/* b->vdot leaves nothing of the rows that stand in no basis. */
+static int others_agree(Mechanism *b, const int *active) {
+    const System *s = b->system;
+    mechanism_at_work(b, b->place, b->reach);
+    for (int k = 0; k < s->m; k++) {
+        if (!active[k] || b->basis[k]) continue;
+        const double size = mechanism_row_size(b, k, b->reach) + fabs(b->gamma[k]);
+        if (!(fabs(mechanism_row(b, k, b->vdot) - b->gamma[k]) <= AGREES * size)) return 0;
+    }
+    return 1;
+}
+
+int mechanism_motion_kept(Mechanism *b, Instant at, const double *q, const double *v, const int *active) {
+    if (b->basis == NULL) return 0;
+    for (int k = 0; k < b->system->m; k++)
+        if (b->basis[k] && !active[k]) return 0;
+    return mechanism_motion(b, at, q, v, b->basis) == OK && linear_plain(&b->linear) && others_agree(b, active);
+}
+
 void mechanism_at_work(const Mechanism *b, double *forces, double *reach) {
     const System *s = b->system;
     for (int j = 0; j < s->nv; j++) {
@@ -122,13 +147,12 @@ static Status find_off(Mechanism *b, Instant at, const double *q, const int *act
     const System *s = b->system;
     *off = 0;
     if (mechanism_residual(b, at, q, b->f) != OK) return FAILED;
+    for (int i = 0; i < s->nv; i++) b->reach[i] = fmax(mechanism_reach(b, q, i), span[i]);
     for (int k = 0; k < s->m; k++) {
         if (!active[k] || s->rows[k].kind == NONHOLONOMIC) continue;
         double reach = 0;
-        for (int e = s->row_start[k]; e < s->row_start[k + 1]; e++) {
-            const int i = s->entry_column[e];
-            reach += fabs(b->G[e]) * fmax(mechanism_reach(b, q, i), span[i]);
-        }
+        for (int e = s->row_start[k]; e < s->row_start[k + 1]; e++)
+            reach += fabs(b->G[e]) * b->reach[s->entry_column[e]];
         if (reach > 0) *off = fmax(*off, fabs(b->f[k] - offset[k]) / reach);
     }
     return OK;

@@ -44,8 +44,11 @@ struct Mechanism {
     double *vdot, *lambda;          /* of the latest motion(): (nv), (m) */
     double *f;                      /* (m) scratch for residuals */
     double *dq, *trial;             /* (nv), (nq) scratch of project(): what moves, q where it is tried */
-    int *fixed;                     /* (m) scratch of project(): position constraints that act */
+    double *reach, *place;          /* (nv) scratch: mechanism_reach() and mechanism_place() of all, or at_work() */
+    int *fixed;                     /* (m) scratch of project(): position constraints that act, with */
+    int *pulls;                     /* (m) those of the basis among them */
     int dependent;                  /* 1: rows that act depend on each other, on the constraints */
+    const int *basis;               /* (m) those that stood for all at the latest state on them; NULL: not known */
     int stage;                      /* 1: of motion(), the accelerations alone are asked for */
     Why *why;
     const Sliding *sliding;     /* NULL without frictions */
@@ -133,6 +136,10 @@ SHARED Status mechanism_residual(Mechanism *b, Instant at, const double *q, doub
 /* evaluate, factor, solve: b->vdot (nv) and b->lambda (m), 0 where a row does not act. */
 SHARED Status mechanism_motion(Mechanism *b, Instant at, const double *q, const double *v,
                                const int *active);
+
+/* The same by the rows of the basis alone, for a state on the constraints: where the others agree with what comes
+ * out it is the motion by all of them.  0: they do not, or the basis does not do here. */
+SHARED int mechanism_motion_kept(Mechanism *b, Instant at, const double *q, const double *v, const int *active);
 
 /* The same for a state off the constraints: what depends on each other on them does so here, and is not
  * asked to agree.  `offset` (m), `span` (nv) as below. */

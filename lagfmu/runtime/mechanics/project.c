@@ -26,6 +26,11 @@ static const double PROJECTION_ROUNDING = 100 * DBL_EPSILON; /* and where Newton
 static const double PROJECTION_LINEAR = 0.1; /* ratio of successive errors: convergence is linear, G loses rank */
 static const double CONTRACTS = 1e-4; /* reduction of the error for which factors are kept */
 
+/* b->pulls <- the rows of the basis among these. */
+static void take_basis(Mechanism *b, const int *rows) {
+    for (int k = 0; k < b->system->m; k++) b->pulls[k] = rows[k] && b->basis[k];
+}
+
 /* How far the positions are off: `error` is the largest |f - offset| relative to its own terms; infinite where
  * a row has none, since no coordinate moves it here. */
 typedef struct {
@@ -39,14 +44,19 @@ static Status measure(Mechanism *b, Instant at, const double *q, const double *o
     const System *s = b->system;
     *miss = (Miss){0, 0, 1};
     if (mechanism_residual(b, at, q, b->f) == FAILED) return FAILED;
+    for (int i = 0; i < s->nv; i++) {
+        const double x = mechanism_reach(b, q, i);
+        b->place[i] = mechanism_place(b, q, i);
+        b->reach[i] = x > span[i] ? x : span[i];
+    }
     for (int k = 0; k < s->m; k++) {
         if (!b->fixed[k]) continue;
         double steepness = 0, reach = 0;
         for (int e = s->row_start[k]; e < s->row_start[k + 1]; e++) {
-            int i = s->entry_column[e];
-            double g = fabs(b->G[e]), x = mechanism_reach(b, q, i);
-            steepness += g * mechanism_place(b, q, i);
-            reach += g * (x > span[i] ? x : span[i]);
+            const int i = s->entry_column[e];
+            const double g = fabs(b->G[e]);
+            steepness += g * b->place[i];
+            reach += g * b->reach[i];
         }
         b->f[k] = offset[k] - b->f[k];
         double off = fabs(b->f[k]);
@@ -77,19 +87,23 @@ static Status no_arrival(Mechanism *b, Instant at, const Miss *miss, double befo
 static Status project_positions(Mechanism *b, Instant at, double *q, const double *v,
                                 const double *offset, const double *span, int *moved) {
     double before = HUGE_VAL;
+    int kept = b->basis != NULL; /* the rows of the basis lead there */
+    if (kept) take_basis(b, b->fixed);
     for (int count = 0;; count++) {
         Miss miss;
         if (measure(b, at, q, offset, span, &miss) == FAILED) return FAILED;
         *moved = count > 0;
         if (miss.rounding || miss.error < DBL_EPSILON * DBL_EPSILON) return OK;
-        if (miss.error > before / 2 && miss.error < PROJECTION_SMALL) return OK; /* rounding in f is left */
+        if (miss.error > before / 2 && miss.error < (kept ? PROJECTION_ROUNDING : PROJECTION_SMALL))
+            return OK; /* rounding in f is left */
         if (count == PROJECTION_ITERATIONS && miss.error < PROJECTION_ROUNDING) return OK;
         if (count == PROJECTION_ITERATIONS) return no_arrival(b, at, &miss, before);
-        int stale = count > 0 && !(miss.error <= CONTRACTS * before);
+        const int stale = count > 0 && !(miss.error <= CONTRACTS * before);
+        kept = kept && !stale;
         if (stale && mechanism_evaluate(b, at, q, v) == FAILED) return FAILED;
-        b->linear.off = b->dependent ? miss.error : 0;
+        b->linear.off = b->dependent && !kept ? miss.error : 0;
         if ((stale || count == 0) &&
-            linear_factor(&b->linear, b->M, b->G, b->fixed) == FAILED)
+            linear_factor(&b->linear, b->M, b->G, kept ? b->pulls : b->fixed) == FAILED)
             return FAILED;
         if (linear_nearest(&b->linear, NULL, b->f, b->dq, NULL) == FAILED) return FAILED;
         mechanism_move(b, 1, b->dq, q);
@@ -98,20 +112,33 @@ static Status project_positions(Mechanism *b, Instant at, double *q, const doubl
     }
 }
 
+/* b->f <- nu - G v on the rows that act; 1 if it is at most so much of its terms. */
+static int is_rounding(Mechanism *b, const double *v, const int *active, double part) {
+    int rounding = 1;
+    for (int k = 0; k < b->system->m; k++) {
+        if (!active[k]) continue;
+        b->f[k] = -mechanism_slip(b, k, v);
+        rounding &= fabs(b->f[k]) <= part * (mechanism_row_size(b, k, v) + fabs(b->nu[k]));
+    }
+    return rounding;
+}
+
+static Status correct_velocities(Mechanism *b, double *v, const int *rows) {
+    if (linear_factor(&b->linear, b->M, b->G, rows) == FAILED) return FAILED;
+    if (linear_nearest(&b->linear, NULL, b->f, b->dq, NULL) == FAILED) return FAILED;
+    for (int j = 0; j < b->system->nv; j++) v[j] += b->dq[j];
+    return OK;
+}
+
 /* G v = nu on the rows that act: v is moved.  Nothing is left to do where the slip is rounding. */
 static Status project_velocities(Mechanism *b, double *v, const int *active) {
-    const System *s = b->system;
-    int rounding = 1;
-    for (int k = 0; k < s->m; k++) {
-        if (!active[k]) continue;
-        b->f[k] = b->nu[k] - mechanism_row(b, k, v);
-        rounding &= fabs(b->f[k]) <= DBL_EPSILON * (mechanism_row_size(b, k, v) + fabs(b->nu[k]));
+    if (is_rounding(b, v, active, DBL_EPSILON)) return OK;
+    if (b->basis != NULL) {
+        take_basis(b, active);
+        if (correct_velocities(b, v, b->pulls) == FAILED) return FAILED;
+        if (is_rounding(b, v, active, PROJECTION_ROUNDING)) return OK;
     }
-    if (rounding) return OK;
-    if (linear_factor(&b->linear, b->M, b->G, active) == FAILED) return FAILED;
-    if (linear_nearest(&b->linear, NULL, b->f, b->dq, NULL) == FAILED) return FAILED;
-    for (int j = 0; j < s->nv; j++) v[j] += b->dq[j];
-    return OK;
+    return correct_velocities(b, v, active);
 }
 
 Status mechanism_project(Mechanism *b, Instant at, double *q, double *v, const int *active,

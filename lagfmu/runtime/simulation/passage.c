@@ -62,17 +62,28 @@ static double falling(Solver *s, double t, const double *y, double apart) {
     return (apart - linear_apart(&s->stepped.linear)) / ahead;
 }
 
+/* Of rows that depend on each other everywhere the angle is that of those that stand for all: others may be
+ * further apart, and are then taken. */
+static int all_narrow(Solver *s, double t, const double *y) {
+    Mechanism *b = &s->stepped;
+    if (mechanism_motion(b, segment_instant(s, t), y, y + s->system->nq, s->active) != OK) return 1;
+    const int narrow = linear_furthest_apart(&b->linear) < NARROW;
+    segment_choose_rows(s);
+    return narrow;
+}
+
 static void look(Solver *s, double t, const double *y) {
     Approach *x = &s->state.now.approach;
     const int dependent = s->state.now.dependent;
     const double h = t - x->t, before = x->apart;
     if (!(h > 0)) return;
-    if (dependent && factor_there(s, t, y, DBL_MIN) != OK) return;
+    const int known = s->stepped.linear.active == solver_rows(s); /* the factors are those of the rows of the step */
+    if (dependent && !known && factor_there(s, t, y, DBL_MIN) != OK) return;
     const double apart = linear_apart(&s->stepped.linear);
     *x = (Approach){t, apart, -1, 0};
     if (!(apart < NARROW)) return;
     const double fall = fabs(before) < NARROW && !dependent ? (before - apart) / h : falling(s, t, y, apart);
-    x->near = fabs(fall) > apart * s->state.now.rate;
+    x->near = fabs(fall) > apart * s->state.now.rate && (!dependent || all_narrow(s, t, y));
     if (!x->near) return;
     x->until = apart / fall;
     if (x->until > 0) s->integrator.h_next = fmax(s->integrator.h_next, STRIDE / s->state.now.rate);

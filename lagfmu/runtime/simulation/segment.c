@@ -18,17 +18,24 @@ static const double FAR = 1e3, LEAST_FAR = 1e-6; /* how far a projection may mov
 static const double BALANCED = 1e3 * DBL_EPSILON; /* of what the forces alone would make of a step: what they
                                                    * leave of it where others hold the state still */
 static const double HOPELESS = 1.0; /* error of one rk4 step, relative to the state: it means nothing */
+static const double KEPT_APART = 0.01; /* angle [rad] of the rows of a step below which others may stand for all better */
 static const double PASSING = 1e-10; /* least tolerance of a step next to a singular configuration */
 static const double TOLERANCE_SHARE = 0.25; /* of the tolerance: errors of many steps add up */
 
+/* Which rows depend on each other.  Those that stick by friction are others from one instant to the next. */
+static void tell_of_rows(Solver *s) {
+    s->stepped.dependent = s->state.now.dependent;
+    s->stepped.basis = s->state.now.dependent && s->system->frictions == 0 ? s->state.basis : NULL;
+}
+
 void segment_begin(Solver *s) {
     system_active(s->system, s->state.closed, s->active);
-    s->stepped.dependent = s->state.now.dependent;
+    tell_of_rows(s);
 }
 
 void segment_choose_rows(Solver *s) {
     s->state.now.dependent = linear_basis(&s->stepped.linear, s->state.basis);
-    s->stepped.dependent = s->state.now.dependent;
+    tell_of_rows(s);
 }
 
 void segment_inputs(const Solver *s, double t, double *u) {
@@ -146,18 +153,21 @@ static Status check_fixed_step(Solver *s, const Integrator *i) {
 }
 
 /* The accelerations at the state on the constraints where a step begins: by all rows, of which those that
- * depend on others are then left out in the step's stages, which lie off the constraints. */
+ * depend on others are then left out in the step's stages, which lie off the constraints; they are chosen anew
+ * where those of the step before do no longer. */
 static Status accept(Solver *s, Integrator *i) {
     const int nq = s->system->nq, nv = s->system->nv;
     if (i != &s->integrator || !i->fresh || s->system->m < 2) return OK;
     const double *y = i->y;
-    if (mechanism_motion(&s->stepped, segment_instant(s, i->t), y, y + nq, s->active) != OK)
-        return FAILED;
-    segment_choose_rows(s);
-    if (OPTIONAL.passage != NULL) OPTIONAL.passage->look(s, i->t, y);
+    const Instant at = segment_instant(s, i->t);
+    const int kept = mechanism_motion_kept(&s->stepped, at, y, y + nq, s->active) &&
+                     linear_apart(&s->stepped.linear) > KEPT_APART;
+    if (!kept && mechanism_motion(&s->stepped, at, y, y + nq, s->active) != OK) return FAILED;
     mechanism_rates(&s->stepped, y + nq, i->f);
     memcpy(i->f + nq, s->stepped.vdot, (size_t)nv * sizeof *y);
     i->fresh = 0;
+    if (!kept) segment_choose_rows(s);
+    if (OPTIONAL.passage != NULL) OPTIONAL.passage->look(s, i->t, y); /* evaluates elsewhere */
     return OK;
 }
 
