@@ -2,7 +2,8 @@
 
 How builds and runs are shared:
 
-- `native_fmu`, `python_fmu`, `fmu` (both), `library`, `prepared`, `playable`, `page_file`: models/;
+- `native_fmu`, `python_fmu`, `fmu` (both), `fmi3_fmu`, `library`, `prepared`, `playable`, `page_file`: of
+  models/;
 - `built`: models of a test's own, and scenes of models/ that it changes (`scene_of`);
 - `shared_folder` with `once(folder, make)` of once.py, for what tests in several files build;
 - `objects` and `compile_library` of runtime.py: the runtime's C files, compiled once for what they hold, also
@@ -32,6 +33,7 @@ from once import once
 
 from lagfmu import Model, Scene, build_fmu
 from lagfmu.testing import (
+    Face,
     ModelFile,
     Playable,
     Prepared,
@@ -134,14 +136,16 @@ def shared_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return (own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "shared"
 
 
-def _built(prepared: Callable[[str], Prepared], folder: Path, target: str) -> Fmu:
+def _built(prepared: Callable[[str], Prepared], folder: Path, target: str, fmi: int = 2) -> Fmu:
+    face = Face(fmi)
+
     def get(name: str) -> Path:
         forms = load(MODELS / f"{EVERY[name]}.py").closed_forms
 
         def make(place: Path) -> None:
-            write(prepared(name), place, forms, target=target)
+            write(prepared(name), place, forms, target=target, face=face)
 
-        return once(folder / f"{target}-{name}", make) / f"{name}.fmu"
+        return once(folder / f"{face.folder(target)}-{name}", make) / f"{name}.fmu"
 
     return cache(get)
 
@@ -158,6 +162,14 @@ def native_fmu(prepared: Callable[[str], Prepared], shared_folder: Path) -> Fmu:
     if find_compiler() is None:
         pytest.skip("no C compiler on this machine: native FMUs are not tested")
     return _built(prepared, shared_folder, "native")
+
+
+@pytest.fixture(scope="session")
+def fmi3_fmu(prepared: Callable[[str], Prepared], shared_folder: Path) -> Fmu:
+    """fmi3_fmu(NAME): path of the native FMU of FMI 3.0, built once."""
+    if find_compiler() is None:
+        pytest.skip("no C compiler on this machine: native FMUs are not tested")
+    return _built(prepared, shared_folder, "native", fmi=3)
 
 
 @pytest.fixture(scope="session")

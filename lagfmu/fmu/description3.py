@@ -71,8 +71,9 @@ def _is_intermediate(v: Variable, table: VariableTable) -> bool:
     """Whether it may be got, or set, in Intermediate Update."""
     if v.kind != "Real" or v.variability != "continuous" or v.of.quantity == names.INDICATOR:
         return False
-    if v.causality == "input":
-        return not any(u.role == "estimate" and u.of.coordinate == v.name for u in table.variables)
+    if v.causality == "input":  # not where a finer run beside is driven too
+        estimated = {u.of.coordinate for u in table.variables if u.role == "estimate"}
+        return v.name not in estimated and not any(u.bar_of for u in table.variables)
     return v.causality in ("output", "local") and not v.members
 
 

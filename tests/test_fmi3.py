@@ -1,0 +1,141 @@
+"""Native FMUs of FMI 3.0: the simulation of FMI 2.0 behind another interface."""
+
+from __future__ import annotations
+
+import itertools
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import fmpy
+import numpy as np
+import pytest
+from conftest import FILES, Fmu, of_each_kind
+from fmpy.build import build_platform_binary
+from fmpy.validation import validate_fmu
+
+import lagfmu
+from lagfmu.testing import Plan, RefusalError, Session, run_batch
+
+COMBINATIONS = list(itertools.product((False, True), repeat=2))  # event mode, early return
+COLUMNS = ("r", "theta", "der(theta)", "lambda.surface")
+FEW = ("Hemisphere", "SlippingSphere", "CartPendulum")  # a contact, frictions, an input
+
+
+def same_bits(a: Any, b: Any) -> bool:
+    """Whether all columns of a run are those of another."""
+    return a.dtype.names == b.dtype.names and all(
+        a[n].tobytes() == b[n].tobytes() for n in a.dtype.names
+    )
+
+
+@pytest.mark.parametrize("name", of_each_kind(FILES, kinds=FEW))
+def test_the_numbers_are_those_of_fmi_2(native_fmu: Fmu, fmi3_fmu: Fmu, name: str) -> None:
+    """All outputs at all communication points, bit for bit."""
+    assert same_bits(lagfmu.simulate(native_fmu(name)), lagfmu.simulate(fmi3_fmu(name)))
+
+
+def test_inputs_act_as_in_fmi_2(native_fmu: Fmu, fmi3_fmu: Fmu) -> None:
+    """A force on the cart that rises, jumps and falls."""
+    force = np.array(
+        [(0.0, 0.0), (0.25, 1.0), (0.25, 3.0), (1.0, 0.0)], dtype=[("time", float), ("F", float)]
+    )
+    runs = [
+        lagfmu.simulate(fmu("CartPendulum"), 1.0, 0.05, inputs=force)
+        for fmu in (native_fmu, fmi3_fmu)
+    ]
+    assert same_bits(*runs)
+    assert np.ptp(runs[0]["s"]) > 0.1
+
+
+@pytest.mark.parametrize("name", of_each_kind(FILES, kinds=FEW))
+@pytest.mark.parametrize("kind", ["CoSimulation", "ModelExchange"])
+def test_fmpy_simulates_it_in_each_way(fmi3_fmu: Fmu, name: str, kind: str) -> None:
+    """With and without event mode, with and without early return: the same motion to the tolerance, and the
+    same events."""
+    path = fmi3_fmu(name)
+    assert validate_fmu(str(path)) == []
+    rows = []
+    for event_mode, early_return in COMBINATIONS if kind == "CoSimulation" else COMBINATIONS[:1]:
+        found = fmpy.simulate_fmu(
+            str(path),
+            fmi_type=kind,
+            use_event_mode=event_mode,
+            early_return_allowed=early_return,
+            relative_tolerance=1e-9,
+        )
+        rows.append(found[-1])
+    own = lagfmu.simulate(path, tolerance=1e-9)[-1]
+    for row in rows:
+        assert row["time"] == own["time"]
+        for n in own.dtype.names or ():
+            if n.startswith(("departure.", "slipping.")) and n.endswith(".count"):
+                assert row[n] == own[n]
+            elif not n.startswith(("solver.", "residual.")) and own[n].dtype == float:
+                assert abs(row[n] - own[n]) < 1e-5 * max(1.0, abs(own[n])), n
+
+
+def test_a_refusal_has_the_reason_that_it_has_in_fmi_2(native_fmu: Fmu, fmi3_fmu: Fmu) -> None:
+    """A radius below zero, a time that runs backwards: the same words, and the next run goes on."""
+    reasons = []
+    for fmu in (native_fmu, fmi3_fmu):
+        with Session(fmu("Hemisphere")) as session:
+            refused = session.run([0.0, 0.1], {"a": -1.0}).refusal
+            assert isinstance(refused, RefusalError)
+            backwards = session.run([0.0, 0.1, 0.05]).refusal
+            assert isinstance(backwards, RefusalError)
+            reasons.append((refused.status, refused.message, backwards.status, backwards.message))
+            assert session.run([0.0, 0.1]).refusal is None
+    first, second = (re.sub(r"fmi\dSet(Real|Float64)|fmi\dDoStep", "", str(r)) for r in reasons)
+    assert first == second
+
+
+def test_many_runs_in_one_call_are_those_of_fmi_2(native_fmu: Fmu, fmi3_fmu: Fmu) -> None:
+    """lagfmu_runs stands beside the standard's functions in both."""
+    plan = Plan(
+        vary=("theta",), keep=(("departure.surface.time", 0),), times=np.linspace(0.0, 2.0, 21)
+    )
+    found = []
+    for fmu in (native_fmu, fmi3_fmu):
+        with Session(fmu("Hemisphere")) as session:
+            found.append(run_batch(session, plan, np.array([[0.01], [0.1], [0.3]])).result)
+    assert found[0].tobytes() == found[1].tobytes()
+    assert (np.diff(found[0][:, 0]) < 0).all()  # the lower it begins, the sooner it leaves
+
+
+def test_verify_holds_its_closed_forms(fmi3_fmu: Fmu) -> None:
+    """Those that a FMU of FMI 3.0 carries are the same statements."""
+    found = lagfmu.verify(fmi3_fmu("Hemisphere"))
+    assert found.passed
+    assert found.closed_forms > 3
+
+
+@pytest.mark.thorough
+def test_fmpy_compiles_it_from_its_sources(fmi3_fmu: Fmu, tmp_path: Path) -> None:
+    """By sources/buildDescription.xml: the same numbers as those of the binary that it came with."""
+    if shutil.which("cmake") is None or shutil.which("cc") is None:
+        pytest.skip("cmake and cc are needed")
+    original = fmi3_fmu("Hemisphere")
+    folder = Path(fmpy.extract(str(original), str(tmp_path)))
+    shutil.rmtree(folder / "binaries")
+    build_platform_binary(folder, cmake_options={"CMAKE_SHARED_LINKER_FLAGS:STRING": "-lm"})
+    anew, run = (
+        fmpy.simulate_fmu(str(path), stop_time=1.0, relative_tolerance=1e-10, output=COLUMNS)
+        for path in (folder, original)
+    )
+    for n in COLUMNS:
+        np.testing.assert_allclose(anew[n], run[n], rtol=1e-12, atol=1e-12)
+
+
+def test_fmutool_reports_no_error(fmi3_fmu: Fmu) -> None:
+    """fmutool -check (fmu-manipulation-toolbox): schema and rules of FMI 3.0."""
+    code = "from fmu_manipulation_toolbox.cli.fmutool import fmutool\nfmutool()"
+    command = [sys.executable, "-c", code, "-input", str(fmi3_fmu("Hemisphere")), "-check"]
+    run = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    text = run.stdout + run.stderr
+    assert run.returncode == 0, text
+    assert "compliant with FMI-3.0" in text
+    assert not re.search(r"\b(ERROR|FATAL|CRITICAL|WARNING)\b", text), text
