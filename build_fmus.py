@@ -33,6 +33,7 @@ from lagfmu import LagfmuError, Verification, verify
 from lagfmu.api import package
 from lagfmu.cli.terminal import prepare_streams
 from lagfmu.fmu.compiler import HOST
+from lagfmu.fmu.face import USUAL, Face
 from lagfmu.fmu.native import takes_long
 from lagfmu.fmu.python import refusals
 from lagfmu.fmu.target import NATIVE, PYTHON, TARGETS, missing_for_native
@@ -64,7 +65,11 @@ class Made:
 
 
 def build_scene(
-    work: tuple[Path, str], targets: Sequence[str], out: Path, platforms: Sequence[str]
+    work: tuple[Path, str],
+    targets: Sequence[str],
+    out: Path,
+    platforms: Sequence[str],
+    face: Face = USUAL,
 ) -> list[Made]:
     """The FMUs of one scene of a model file, an FMU a target: what is prepared serves all."""
     path, name = work
@@ -81,8 +86,8 @@ def build_scene(
                 if target == PYTHON and (reasons := refusals(prepared)):
                     made.append(Made(name, target, refused="; ".join(reasons)))
                     continue
-                folder, forms = out / target, file.closed_forms
-                fmu = package(prepared, folder, forms, target, platforms, reference=True)
+                folder, forms = out / face.folder(target), file.closed_forms
+                fmu = package(prepared, folder, forms, target, platforms, reference=True, face=face)
                 spent = time.perf_counter() - begun
                 found = fmu.verification or verify(fmu.path)
                 runs = [found, *(verify(fmu.path) for _ in range(RUNS - 1))]
@@ -95,10 +100,14 @@ def build_scene(
 
 
 def build_all(
-    work: Sequence[tuple[Path, str]], targets: Sequence[str], out: Path, platforms: Sequence[str]
+    work: Sequence[tuple[Path, str]],
+    targets: Sequence[str],
+    out: Path,
+    platforms: Sequence[str],
+    face: Face = USUAL,
 ) -> Iterator[list[Made]]:
     """The FMUs of each scene in turn, made by as many processes as the machine has cores."""
-    build = partial(build_scene, targets=targets, out=out, platforms=platforms)
+    build = partial(build_scene, targets=targets, out=out, platforms=platforms, face=face)
     processes = min(len(work), os.cpu_count() or 1)
     if processes < 2:
         yield from map(build, work)
@@ -118,14 +127,21 @@ def main(
         list[str] | None,
         typer.Option(metavar="all|host|NAME...", help="Where native FMUs can run; repeatable."),
     ] = None,
+    fmi: Annotated[
+        int,
+        typer.Option(metavar="2|3", help="The version of FMI; of 3 there are native FMUs alone."),
+    ] = 2,
 ) -> None:
     """Build and verify the models in models/, for both targets."""
     prepare_streams()
+    face = Face(fmi)
     console = Console()
     places = tuple(platforms or [HOST])
     missing = missing_for_native()
     targets = (PYTHON,) if missing else TARGETS
-    if missing:
+    if fmi == 3:
+        targets = (NATIVE,)
+    elif missing:
         console.print(f"{missing}; python FMUs only", soft_wrap=True)
     problems: list[str] = []
     work: list[tuple[Path, str]] = []
@@ -149,7 +165,7 @@ def main(
     shown = console.is_terminal
     with Progress(*columns, console=console, transient=True, disable=not shown) as progress:
         task = progress.add_task("scenes", total=len(work))
-        for scene in build_all(work, targets, out, places):
+        for scene in build_all(work, targets, out, places, face):
             for made in scene:
                 problems += _report(console, width, made)
                 total += not made.refused

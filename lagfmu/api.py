@@ -14,9 +14,11 @@ from rich.console import Console
 
 from .errors import VerificationError
 from .fmu.compiler import HOST, chosen, host
+from .fmu.face import USUAL, Face
 from .fmu.native import try_start
-from .fmu.target import NATIVE, PYTHON, target_of
+from .fmu.target import NATIVE, PYTHON
 from .fmu.write import as_fmu, put, write
+from .live.icon import icon
 from .live.playable import playable
 from .live.render import render
 from .model.closed_form import ClosedForm, Conserved
@@ -55,6 +57,9 @@ def build_fmu(
     reference: bool = False,
     page: bool = False,
     sources: bool = True,
+    fmi: int = 2,
+    clocks: bool = False,
+    arrays: bool = False,
 ) -> Path:
     """Build `model` as an FMU into the folder `out` (or to `out` itself if it ends in .fmu), and verify it.
 
@@ -70,14 +75,19 @@ def build_fmu(
 
     Without `sources` a native FMU carries no C files: it is smaller, and no tool can compile it again.
 
+    `fmi`: the version of FMI, 2 or 3, of a native FMU; 3 alone has `clocks` and `arrays` (docs/importers.md).
+
     With `page` its documentation holds its live page (documentation/play.html), which needs ziglang.
 
     Raises ModelError, DerivationError, BuildError; SimulationError if it cannot be simulated;
     VerificationError with the statements that do not hold.  After the last two the file is kept.
     """
-    target = target_of(target)
+    face = Face(fmi, clocks, arrays)
+    target = face.target(target)
     prepared = prepare(model, scene)
-    built = package(prepared, out, closed_forms, target, platforms, check, reference, page, sources)
+    built = package(
+        prepared, out, closed_forms, target, platforms, check, reference, page, sources, face=face
+    )
     found = built.verification
     if found is not None and not found.passed:
         failed = "; ".join(str(c) for c in found.checks if c.failed)
@@ -146,6 +156,7 @@ def package(
     page: bool = False,
     sources: bool = True,
     tick: Tick | None = None,
+    face: Face = USUAL,
 ) -> Built:
     """What `prepare` made as an FMU: with the tolerance that holds its accuracy, which `tick` hears being
     found, built once, verified once, its figures put in."""
@@ -154,7 +165,9 @@ def package(
         choice = choose(prepared.model, asked, parse(asked.accuracy), tick, target)
         prepared = prepare(prepared.model, choice.scene, prepared.derived)
     told, live = section(choice) if choice else "", render(playable(prepared)) if page else ""
-    path = write(prepared, out, closed_forms, target, platforms, told, live, sources)
+    path = write(
+        prepared, out, closed_forms, target, platforms, told, live, sources, face, icon(prepared)
+    )
     runs_here = target == PYTHON or host() in chosen(platforms)
     found = verify_fmu(path) if check and runs_here else None
     more = layered(path, found) if reference and runs_here else {}

@@ -42,6 +42,7 @@ from .fmu.terminals import terminals
 from .fmu.write import as_built, write
 from .interface.rules import problems_of
 from .live import moving, wasm
+from .live.icon import icon
 from .live.moving import Moving
 from .live.playable import playable, told_by
 from .live.render import Playable, render

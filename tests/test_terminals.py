@@ -1,16 +1,20 @@
-"""terminalsAndIcons.xml: what belongs together where FMUs are coupled."""
+"""terminalsAndIcons/: what belongs together where FMUs are coupled, and what the FMU looks like."""
 
 from __future__ import annotations
 
+import io
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from xml.etree.ElementTree import fromstring
 
 import fmpy
+import matplotlib.image
 from coupled_model import absorber
 from lxml import etree
 
-from lagfmu.testing import Prepared, prepare, terminals
+from lagfmu import build_fmu
+from lagfmu.testing import Prepared, icon, prepare, terminals
 
 SCHEMA = Path(fmpy.__file__).parent / "schema" / "fmi3" / "fmi3TerminalsAndIcons.xsd"
 
@@ -58,3 +62,21 @@ def test_each_joint_is_one(prepared: Callable[[str], Prepared]) -> None:
 def test_there_is_none_without(prepared: Callable[[str], Prepared]) -> None:
     """A particle on a hemisphere has neither joint nor drive."""
     assert terminals(prepared("Hemisphere")) is None
+
+
+def test_the_icon_is_the_picture_at_the_start(
+    prepared: Callable[[str], Prepared], tmp_path: Path
+) -> None:
+    """A pendulum hangs to one side; what is drawn does not depend on the coordinates that are stepped."""
+    drawn = icon(prepared("PendulumCartesian"))
+    shown = matplotlib.image.imread(io.BytesIO(drawn["terminalsAndIcons/icon.png"]))
+    assert shown.shape == (128, 128, 4)
+    assert 0 < (shown[..., 3] > 0).mean() < 0.5  # lines on nothing
+    assert fromstring(drawn["terminalsAndIcons/icon.svg"]).tag.endswith("svg")
+    assert icon(prepared("PendulumAngle")) == drawn
+    assert icon(prepare(absorber)) == {}
+    model = prepared("PendulumCartesian").model
+    with zipfile.ZipFile(build_fmu(model, tmp_path, target="python", check=False)) as fmu:
+        found = fromstring(fmu.read("terminalsAndIcons/terminalsAndIcons.xml"))
+        assert drawn.keys() < set(fmu.namelist())
+    assert found.find("GraphicalRepresentation/Icon") is not None

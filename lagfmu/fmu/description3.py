@@ -7,6 +7,7 @@ from collections.abc import Collection, Mapping, Sequence
 from xml.etree.ElementTree import Element, SubElement
 
 from .. import names
+from ..codegen.c.interface import Dependencies
 from ..interface.variables import Variable, VariableTable
 from .described import (
     HOW,
@@ -80,16 +81,30 @@ def _is_intermediate(v: Variable, table: VariableTable) -> bool:
 def structure(root: Element, table: VariableTable) -> None:
     """Outputs, derivatives, unknowns at the start, event indicators."""
     found, parent = structure_of(table), SubElement(root, "ModelStructure")
-    indicators = [Unknown(v.name, v.depends) for v in table.those(names.INDICATOR)]
     for name, unknowns in (
         ("Output", found.outputs),
         ("ContinuousStateDerivative", found.derivatives),
         ("InitialUnknown", found.initial),
-        ("EventIndicator", indicators),
+        ("EventIndicator", _indicators(table)),
     ):
         for u in unknowns:
             reference = {"valueReference": str(table.position[u.name])}
             SubElement(parent, name, reference | u.attributes(table.position))
+
+
+def _indicators(table: VariableTable) -> list[Unknown]:
+    return [Unknown(v.name, v.depends) for v in table.those(names.INDICATOR)]
+
+
+def dependencies(table: VariableTable) -> tuple[Dependencies, Dependencies]:
+    """What the structure says, by value references: of unknowns at the start, and of all others."""
+    found, places = structure_of(table), table.position
+    running = [*found.outputs, *found.derivatives, *_indicators(table)]
+    of_start, of_running = (
+        {places[u.name]: sorted(places[n] for n in u.known if n in places) for u in unknowns}
+        for unknowns in (found.initial, running)
+    )
+    return of_start, of_running
 
 
 def build_description(identifier: str, sources: Sequence[str]) -> bytes:

@@ -63,4 +63,4 @@ class Face:
         return not any(file.startswith(start) for start in others)
 
 
-FMI2 = Face()
+USUAL = Face()

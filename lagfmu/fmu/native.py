@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from importlib.resources import files
 
 from ..codegen.c.equations import model_source
+from ..codegen.c.interface import interface_source
 from ..codegen.c.optional import files_left_out, held, needs_tangents, optional_source
 from ..codegen.c.tables import entanglements
 from ..codegen.c.variables import variables_source
@@ -16,8 +17,8 @@ from .archive import pack, tool
 from .capabilities import interfaces_of
 from .compiler import HOST, Platform, chosen, compile_libraries, host, is_first
 from .description import guid_of, model_description
-from .description3 import build_description
-from .face import FMI2, Face
+from .description3 import build_description, dependencies
+from .face import USUAL, Face
 from .target import missing_for_native
 from .trial import check_start
 
@@ -64,7 +65,7 @@ def build(
     extra: Mapping[str, bytes],
     platforms: Sequence[str] = (HOST,),
     sources: bool = True,
-    face: Face = FMI2,
+    face: Face = USUAL,
 ) -> bytes:
     """The bytes of the FMU.  `extra` maps further paths inside the archive to their content; `sources`: it
     carries its C files.  Raises CannotStartError for one that refuses its own start."""
@@ -84,7 +85,7 @@ def build(
 
 
 def _check_start(
-    prepared: Prepared, made: Sources, libraries: Mapping[str, bytes], face: Face = FMI2
+    prepared: Prepared, made: Sources, libraries: Mapping[str, bytes], face: Face = USUAL
 ) -> None:
     """Raises CannotStartError; of an FMU for other machines alone it is asked where there are frictions."""
     here = host()
@@ -104,7 +105,7 @@ def try_start(prepared: Prepared) -> str:
     return missing
 
 
-def sources_of(prepared: Prepared, listed: bool = True, face: Face = FMI2) -> Sources:
+def sources_of(prepared: Prepared, listed: bool = True, face: Face = USUAL) -> Sources:
     """The C files and the description, which has them `listed` where the FMU carries them.
 
     Raises BuildError for a method that cannot step the model.
@@ -126,6 +127,8 @@ def sources_of(prepared: Prepared, listed: bool = True, face: Face = FMI2) -> So
         "optional.c": optional_source(scene, system, integrators, bool(table.measured)).encode(),
     }
     gone |= generated.keys() | {file for file in everything if not face.holds(file)}
+    if face.fmi == 3:
+        generated["interface.c"] = interface_source(scene.name, *dependencies(table)).encode()
     runtime = {file: text for file, text in everything.items() if file not in gone}
     watched = len(system.contacts) + len(system.switches) + 2 * len(system.frictions)
     interfaces = interfaces_of(prepared, face)

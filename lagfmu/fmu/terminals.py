@@ -18,7 +18,7 @@ from ..names import Subject
 from ..prepare.prepare import Prepared
 from .described import as_text
 
-IN_FMU = "terminalsAndIcons/terminalsAndIcons.xml"
+IN_FMU, ICON = "terminalsAndIcons/terminalsAndIcons.xml", "terminalsAndIcons/icon"
 MEMBERS = ("position", "velocity", "acceleration")
 SIGNAL = "signal"
 WRENCH = ("force", "torque")

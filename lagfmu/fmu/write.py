@@ -10,6 +10,7 @@ import zipfile
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 
@@ -32,7 +33,7 @@ from .archive import pack
 from .capabilities import offers_exchange
 from .closed_forms import pack_closed_forms
 from .compiler import HOST
-from .face import FMI2, Face
+from .face import USUAL, Face
 from .target import NATIVE, target_of
 from .terminals import IN_FMU, terminals
 
@@ -52,13 +53,14 @@ def write(
     choice: str = "",
     live: str = "",
     sources: bool = True,
-    face: Face = FMI2,
+    face: Face = USUAL,
+    icon: Mapping[str, bytes] = MappingProxyType({}),
 ) -> Path:
     """Package what `prepare` made into the folder `out`, or to `out` itself if it ends in .fmu.
 
-    `choice` is HTML on how the solver settings were chosen, `live` the page in which the FMU runs; without
-    `sources` a native FMU carries no C files.  For
-    the rest see api.build_fmu.  Warns of each start value that is moved onto the constraints.  Raises
+    `choice` is HTML on how the solver settings were chosen, `live` the page in which the FMU runs, `icon` the
+    files of its icon; without `sources` a native FMU carries no C files.  For the rest see api.build_fmu.
+    Warns of each start value that is moved onto the constraints.  Raises
     ModelError if one in the model's `start` moves by more than 1e-6 of its coordinate's size.
     """
     target = face.target(target)
@@ -79,7 +81,8 @@ def write(
         ),
     }
     extra[LICENSE] = license_of(target, sources).encode()
-    if (found := terminals(prepared)) is not None:
+    extra |= icon
+    if (found := terminals(prepared, bool(icon))) is not None:
         extra[IN_FMU] = found
     if live:
         extra[LIVE] = live.encode()
@@ -171,7 +174,7 @@ def put(path: Path, more: Mapping[str, bytes], figures: Sequence[tuple[str, ...]
     write_whole(path, pack(contents))
 
 
-def as_built(prepared: Prepared, target: str, face: Face = FMI2) -> Prepared:
+def as_built(prepared: Prepared, target: str, face: Face = USUAL) -> Prepared:
     """With the nominal values of states, and what the interface has variables for; a python FMU has no model
     exchange and no native variables."""
     table = prepared.table if target == NATIVE else python.offered(prepared)

@@ -105,7 +105,7 @@ def picture_of(prepared: Prepared) -> dict[str, Any] | None:
             problems.append(f"picture, shape {number} ({type(shape).__name__}): {error}")
     if problems:
         raise ModelError(model.name, problems)
-    kept = [s for s in shapes if _names(s) - {s.get("over")} <= names]
+    kept = [s for s in shapes if names_in(s) <= names]
     if not kept:
         return None
     return {"dimensions": len(points_of(model.picture[0])[0]), "shapes": kept}
@@ -215,6 +215,11 @@ def pack(expression: Expr, numbers: Mapping[str, Any] = {}) -> Packed:
             f"{expression} cannot be drawn, expected sums, products, powers, tables, {known}"
         )
     return [operation, *(pack(a, numbers) for a in expression.args)]
+
+
+def names_in(shape: Mapping[str, Any]) -> set[str]:
+    """The variables of a shape."""
+    return _names(shape) - {shape.get("over")}
 
 
 def _names(packed: Any) -> set[str]:

@@ -3,10 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ..fmu.read import Trajectory
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Missed:
+    """A statement that fails, along the run: `time` (points,) [s], `actual` and `expected` (points,)."""
+
+    time: Floats
+    actual: Floats
+    expected: Floats
 
 
 @dataclass(frozen=True)
@@ -14,7 +28,7 @@ class Check:
     """One statement: its largest error relative to its scale, and the error that is allowed.
 
     `points` is the number of communication points at which it was evaluated; with 0 it was not
-    reached, and nothing is known.
+    reached, and nothing is known.  `missed`, of one that fails: what was found, and what was expected.
     """
 
     name: str
@@ -22,6 +36,7 @@ class Check:
     allowed: float
     points: int
     detail: str = ""
+    missed: Missed | None = field(default=None, repr=False, compare=False)
 
     @property
     def passed(self) -> bool:

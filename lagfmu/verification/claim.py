@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from .. import names
 from ..fmu.read import Trajectory
 from ..model.elements import Expr
-from .check import Check
+from .check import Check, Missed
 from .closed_forms import first_miss
 from .evaluate import evaluate
 
@@ -58,28 +58,32 @@ class Claim:
 
         if self.kind == "event":
             return [self._event(of, rows["time"])]
-        deviation = self._deviation(of)
+        actual, nearest = of("of"), self._nearest(of)
+        deviation = np.abs(actual - nearest)
         scale = float(np.abs(of("scale" if "scale" in self.formulas else "of")).max()) or 1.0
         error = max(float(deviation.max()) - self.absolute, 0.0) / scale
         if not np.isfinite(error):
             return [Check(self.name, np.inf, self.within, len(rows), "not a finite number")]
         misses = deviation > self.absolute + self.within * scale
         detail = first_miss(result, np.flatnonzero(chosen)[misses])
-        return [Check(self.name, error, self.within, len(rows), detail)]
+        missed = Missed(rows["time"], actual, nearest) if misses.any() else None
+        return [Check(self.name, error, self.within, len(rows), detail, missed)]
 
-    def _deviation(self, of: Values) -> NDArray[np.float64]:
-        """How far each point is from what is said, in the unit of `of`; nowhere negative."""
+    def _nearest(self, of: Values) -> NDArray[np.float64]:
+        """What `of` would have to be at each point, as near as possible to what it is."""
         actual = of("of")
         if self.kind == "equal":
-            return np.asarray(np.abs(actual - of("to")))
+            return of("to")
         if self.kind == "conserved":
-            return np.asarray(np.abs(actual - actual[0]))
+            return np.full_like(actual, actual[0])
         if self.kind == "monotone":
-            rising = self.direction * actual
-            return np.asarray(np.maximum.accumulate(rising) - rising)
-        below = of("at_least") - actual if "at_least" in self.formulas else np.zeros_like(actual)
-        above = actual - of("at_most") if "at_most" in self.formulas else np.zeros_like(actual)
-        return np.asarray(np.maximum(np.maximum(below, above), 0.0))
+            highest = np.maximum.accumulate(self.direction * actual)
+            return np.asarray(self.direction * highest)
+        if "at_least" in self.formulas:
+            actual = np.maximum(actual, of("at_least"))
+        if "at_most" in self.formulas:
+            actual = np.minimum(actual, of("at_most"))
+        return actual
 
     def _event(self, of: Values, times: NDArray[np.float64]) -> Check:
         """A condition becomes true between two points of a run: no error where the time that is said lies

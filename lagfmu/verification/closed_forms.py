@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from .. import names
 from ..fmu.closed_forms import CarriedForm
 from ..fmu.read import Trajectory
-from .check import Check
+from .check import Check, Missed
 from .evaluate import evaluate
 
 
@@ -49,7 +49,9 @@ def check_closed_form(
         return Check(closed_form.name, math.inf, allowed, count, "not a finite number")
     misses = np.abs(actual - expected) > allowed * (scale if scale > 0 else 1.0)
     detail = first_miss(result, np.flatnonzero(chosen)[misses])
-    return Check(closed_form.name, error / scale if scale > 0 else error, allowed, count, detail)
+    missed = Missed(rows["time"], actual, expected) if misses.any() else None
+    error = error / scale if scale > 0 else error
+    return Check(closed_form.name, error, allowed, count, detail, missed)
 
 
 def first_miss(result: Trajectory, missed: NDArray[np.int_]) -> str:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..errors import SettingError
 from ..fmu.read import Trajectory
-from .check import Check
+from .check import Check, Missed
 
 TRUTH = {"True": 1.0, "False": 0.0, "true": 1.0, "false": 0.0}
 
@@ -63,7 +63,8 @@ class Reference:
         scale = float(np.abs(expected).max())
         beyond = np.maximum(np.abs(actual - expected) - self.atol, 0.0)
         error = float(beyond.max()) / (scale or 1.0)
-        return Check(f"reference: {name}", error, allowed, int(chosen.sum()))
+        missed = Missed(times[chosen], actual, expected) if error > allowed else None
+        return Check(f"reference: {name}", error, allowed, int(chosen.sum()), missed=missed)
 
 
 def at(result: Trajectory, name: str, times: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -10,7 +10,8 @@ import typer
 
 from ...errors import UsageError, VerificationError
 from ...fmu.compiler import HOST, NAMES
-from ...fmu.target import NATIVE, PYTHON, target_of
+from ...fmu.face import Face
+from ...fmu.target import NATIVE, PYTHON
 from ...verification.exit_codes import FAILS
 from ..options import (
     NARROWING,
@@ -65,6 +66,26 @@ def build(
         bool,
         typer.Option(help="Whether a native FMU carries its C sources."),
     ] = True,
+    fmi: Annotated[
+        int,
+        typer.Option(
+            metavar="2|3",
+            help="The version of FMI; 3 is for native FMUs, which get a folder of their own.",
+        ),
+    ] = 2,
+    clocks: Annotated[
+        bool,
+        typer.Option(
+            "--clocks",
+            help="FMI 3.0: a clock for each contact and friction; the importer must use event mode.",
+        ),
+    ] = False,
+    arrays: Annotated[
+        bool,
+        typer.Option(
+            "--arrays", help="FMI 3.0: lambda, Q and residuals of a unit as an array too."
+        ),
+    ] = False,
     *,
     needs: Needs,
     add_output: AddOutput = None,
@@ -84,7 +105,9 @@ def build(
             raise UsageError(
                 "--platforms is for --target native: a python FMU has no binaries of ours"
             )
-        kind = target_of(NATIVE if platforms else target)
+        face = Face(fmi, clocks, arrays)
+        kind = face.target(NATIVE if platforms else target)
+        folder = out / face.folder(kind)
         file = loaded(model, add_output, arguments)
         for s in narrowed(file.called(scene), {**needs, "accuracy": accuracy}):
             what = (
@@ -95,10 +118,10 @@ def build(
                 prepared = prepare(file.model, s)
                 less = any(needs[n] is not None for n in NARROWING)
                 if less and needs["name"] is None:
-                    _keep_the_full_one(out / kind / f"{s.name}.fmu", prepared.table)
+                    _keep_the_full_one(folder / f"{s.name}.fmu", prepared.table)
                 built = package(
                     prepared,
-                    out / kind,
+                    folder,
                     file.closed_forms,
                     kind,
                     places,
@@ -107,6 +130,7 @@ def build(
                     page_,
                     sources,
                     None if s.accuracy is None else shown,
+                    face,
                 )
             path, found = built.path, built.verification
             if built.choice is not None:
