@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 import sympy as sp
@@ -93,8 +92,7 @@ def mechanism(
         parts=lines_of(bodies, parts),
         **{"picture": picture_of(draft, parts), **more},
     )
-    begins, rough = assemble(draft, model, parts, start or {})
-    return replace(model, start=begins, rough=rough)
+    return model.started(*assemble(draft, model, parts, start or {}))
 
 
 def _wound(parts: Sequence[Any], start: Mapping[str, Any]) -> set[str]:

@@ -1,8 +1,14 @@
-"""Conditions on a mechanism as numbers: their values, and their rates, which are affine in the speeds."""
+"""Conditions on a mechanism as numbers: their values, and their rates, which are affine in the speeds.
+
+Those that are alike are evaluated together, by the function of one of them over arrays.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from itertools import count
+from typing import Any
 
 import numpy as np
 import sympy as sp
@@ -10,7 +16,8 @@ from numpy.typing import NDArray
 from sympy.core.function import AppliedUndef
 from sympy.physics.vector import dynamicsymbols
 
-from ..model.attitude import Attitude, written_out
+from ..model.alike import Pattern, Place, pattern
+from ..model.closing import Closing, computed
 from ..model.elements import Constraint, Expr, Nonholonomic, Tie
 from ..model.model import Model
 
@@ -25,35 +32,38 @@ class Rows:
     """
 
     def __init__(self, model: Model, pairs: Sequence[tuple[Expr, Expr]]) -> None:
-        q = sp.symbols(f"q:{len(model.coordinates)}")
-        v = sp.symbols(f"v:{len(model.directions)}")
-        known = dict(zip(model.states, (*q, *v), strict=True))
-        known |= {p.symbol: sp.Float(p.value, 17) for p in model.parameters}
-        known |= {i.symbol: sp.Float(i.start, 17) for i in model.inputs}
-        known |= {i.symbol.diff(TIME): sp.Float(i.rate, 17) for i in model.prescribed}
-        place, rest = {s: j for j, s in enumerate(v)}, dict.fromkeys(v, sp.S.Zero)
-        self.shape = len(pairs), len(v)
-        self._at: list[tuple[int, int]] = []
-        slopes, values, drifts = [], [], []
+        names = model.states
+        n, known = len(model.coordinates), _numbers(model)
+        place: dict[Expr, Place] = {s: ("qv"[j >= n], j) for j, s in enumerate(names)}
+        place |= {s: ("known", j) for j, s in enumerate(known, len(names))}
+        self.shape = len(pairs), len(names) - n
+        kinds: dict[object, _Kind] = {}
         for i, pair in enumerate(pairs):
-            value, rate = (sp.sympify(e).xreplace(known).xreplace({TIME: sp.S.Zero}) for e in pair)
-            for s in sorted(rate.free_symbols & place.keys(), key=place.__getitem__):
-                self._at.append((i, place[s]))
-                slopes.append(rate.diff(s))
-            values.append(value)
-            drifts.append(rate.xreplace(rest))
-        elements = sorted({a for e in (*slopes, *values) for a in e.atoms(Attitude)}, key=str)
-        R = sp.symbols(f"R:{len(elements)}")
-        closed = dict(zip(elements, R, strict=True))
-        self._elements = sp.lambdify([q], [written_out(a) for a in elements], "numpy")
-        self._values, self._drifts, self._slopes = (
-            sp.lambdify([q, R], [e.xreplace(closed) for e in part], "numpy")
-            for part in (values, drifts, slopes)
-        )
+            found = pattern([*map(sp.sympify, pair)], place.get, "known")
+            assert found is not None  # checked with the model
+            kind = kinds.setdefault(found.kind, _Kind(found))
+            kind.rows.append(i)
+            read = zip(found.inputs, found.groups, strict=True)
+            kind.inputs.append([place[s][1] if g else float(s.xreplace(known)) for s, g in read])
+        self._kinds = [_Function(kind, n) for kind in kinds.values()]
+        everything = [s for f in self._kinds for s in f.symbols]
+        parts = [f.parts for f in self._kinds]
+        self._made = sp.lambdify(everything, parts, "numpy") if parts else lambda: []
+        self._known = np.array([*map(float, known.values())])
+
+    def _at(self, q: Array) -> Iterator[tuple[_Function, Array]]:
+        """Of each kind (value, rate without speeds, slopes by the speeds that it reads), of all its rows."""
+        x = np.concatenate([q, np.zeros(self.shape[1]), self._known])
+        found = self._made(*(value for f in self._kinds for value in f.read(x)))
+        for f, parts in zip(self._kinds, found, strict=True):
+            yield f, np.array([np.broadcast_to(part, f.rows.shape) for part in parts])
 
     def values(self, q: Array) -> Array:
         """e(q) (m)."""
-        return np.array(self._values(q, self._elements(q)), dtype=float)
+        found = np.zeros(self.shape[0])
+        for f, parts in self._at(q):
+            found[f.rows] = parts[0]
+        return found
 
     def rates(self, q: Array, v: Array) -> Array:
         """Their rates (m)."""
@@ -61,15 +71,70 @@ class Rows:
 
     def drifts(self, q: Array) -> Array:
         """Their rates while the speeds are 0 (m)."""
-        return np.array(self._drifts(q, self._elements(q)), dtype=float)
+        found = np.zeros(self.shape[0])
+        for f, parts in self._at(q):
+            found[f.rows] = parts[1]
+        return found
 
     def slopes(self, q: Array) -> Array:
         """Their slopes by the speeds (m, n_v)."""
         found = np.zeros(self.shape)
-        if self._at:
-            i, j = zip(*self._at, strict=True)
-            found[i, j] = self._slopes(q, self._elements(q))
+        for f, parts in self._at(q):
+            found[f.rows[:, None], f.speeds] = parts[2:].T
         return found
+
+
+@dataclass
+class _Kind:
+    """Rows of one pattern, and what each reads: a place in q, v and the known numbers, or a number."""
+
+    pattern: Pattern
+    rows: list[int] = field(default_factory=list)
+    inputs: list[list[Any]] = field(default_factory=list)
+
+
+class _Function:
+    """The `rows` of a kind and the `speeds` that each reads; `parts` are their value, their rate without
+    speeds and its slopes, in `symbols`."""
+
+    def __init__(self, kind: _Kind, n: int) -> None:
+        symbols, groups = kind.pattern.symbols, kind.pattern.groups
+        value, rate = kind.pattern.values
+        v = [s for s, group in zip(symbols, groups, strict=True) if group == "v"]
+        parts = [value, rate.xreplace(dict.fromkeys(v, sp.S.Zero)), *(rate.diff(s) for s in v)]
+        numbers = count()
+        self._closing = Closing(lambda letter: f"{letter}{next(numbers)}")
+        self.parts, places = self._closing.opened(parts)
+        self._inputs = symbols
+        used = set().union(*(e.free_symbols for e in self.parts))
+        self._closed = [(s, place) for s, place in places.items() if s in used]
+        self._plain = [k for k, s in enumerate(symbols) if s in used]
+        table = {s: sp.Dummy() for s in used}
+        self.parts = [e.xreplace(table) for e in self.parts]
+        self.symbols = [table[symbols[k]] for k in self._plain]
+        self.symbols += [table[s] for s, _ in self._closed]
+        self.rows = np.array(kind.rows)
+        columns = [np.array(column) for column in zip(*kind.inputs, strict=True)]
+        self._columns = [(c, group) for c, group in zip(columns, groups, strict=True)]
+        speeds = [c - n for c, group in self._columns if group == "v"]
+        self.speeds = np.array(speeds, dtype=int).reshape(len(v), len(self.rows)).T
+
+    def read(self, x: Array) -> Iterator[Array]:
+        """What stands for the symbols, an array each."""
+        inputs = [x[c] if group else c for c, group in self._columns]
+        yield from (inputs[k] for k in self._plain)
+        known = dict(zip(self._inputs, inputs, strict=True))
+        found = computed(self._closing.steps, known)
+        for _, (name, k) in self._closed:
+            yield found[name][k]
+
+
+def _numbers(model: Model) -> dict[Expr, Expr]:
+    """What is known at the start besides the motion."""
+    found = {p.symbol: sp.Float(p.value, 17) for p in model.parameters}
+    found |= {i.symbol: sp.Float(i.start, 17) for i in model.inputs}
+    found |= {i.symbol.diff(TIME): sp.Float(i.rate, 17) for i in model.prescribed}
+    return found | {TIME: sp.S.Zero}
 
 
 def condition(model: Model, c: Constraint) -> tuple[Expr, Expr]:

@@ -9,16 +9,17 @@ frame into those along the ground's axes.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import cached_property
 from typing import Any
 
 import sympy as sp
 from sympy.physics.vector import dynamicsymbols
 
-from ..model.attitude import quaternion_rates, rotation_matrix
+from ..model.attitude import carried, quaternion_rates, rotation_matrix
 from ..model.elements import Expr
 from .body import Body, Ground, Marker
 from .draft import Draft
-from .motion import Motion, Placed
+from .motion import Motion, Placed, TimedVector
 from .rotation import Rotation, rotation_of
 from .vectors import AXES, ZERO, Vector, dot, minus
 
@@ -35,6 +36,7 @@ class SpaceMotion(Motion):
         self.coordinates, self.speeds, self.kinematics, self.descriptions = {}, {}, {}, {}
         self.mass, self.masses = sp.S.Zero, ()
         self.rotation = STILL
+        self._quaternion: tuple[Expr, ...] = ()
         self._center = ZERO
         self.position = self.velocity = self.spin = ZERO
         if isinstance(body, Body):
@@ -62,7 +64,7 @@ class SpaceMotion(Motion):
                 for s, x in zip(w, AXES, strict=True)
             },
         }
-        self.rotation = _matrix(e)
+        self.rotation, self._quaternion = _matrix(e), e
         self.position, self.spin = r, w
         self.velocity = (r[0].diff(TIME), r[1].diff(TIME), r[2].diff(TIME))
         self._center = draft.vector(body.center, f"{name}.center", "m", "centre of mass")
@@ -95,6 +97,17 @@ class SpaceMotion(Motion):
     def turned(self, v: Vector) -> Vector:
         """Components in the body's frame -> along the ground's axes."""
         return dot(self.rotation[0], v), dot(self.rotation[1], v), dot(self.rotation[2], v)
+
+    def fixed(self, vector: Vector) -> TimedVector:
+        """A vector that is fixed on the body, closed: joints of a kind are alike, whatever it is."""
+        if not self.coordinates or vector == ZERO:
+            return TimedVector(vector, ZERO, ZERO)
+        return TimedVector(*(carried(k, self._quaternion, vector, self.spin) for k in range(3)))
+
+    @cached_property
+    def omega(self) -> Vector:
+        """Closed as well."""
+        return carried(0, self._quaternion, self.spin, ZERO) if self.coordinates else ZERO
 
     def placed(self, marker: Marker, point: Vector) -> Placed:
         """The marker, whose point [m] is given in the body's own frame."""

@@ -21,7 +21,6 @@ from ..mechanics.equations import TIME, EquationsOfMotion, formulas_of
 from ..mechanics.form import Form
 from ..mechanics.formulations.minimal import Reduction
 from ..mechanics.jumps import NONE, Jumps
-from ..model.attitude import written_out
 from ..model.elements import Expr
 from ..model.model import Constraint, Contact, Nonholonomic
 from ..model.units import ONE, SECOND, Unit
@@ -286,9 +285,7 @@ class Parts:
             text = "Their change along the direction (dt, dq, du)."
             yield self._tangent("kinematics_tangent", text, still, results)
         if eom.unwrapped:
-            angles = values(
-                [*map(written_out, eom.unwrapped.values())], [eom.q[j] for j in eom.unwrapped]
-            )
+            angles = values([*eom.unwrapped.values()], [eom.q[j] for j in eom.unwrapped])
             text = "What angles equal modulo 2 pi."
             yield Function("unwrapped_angles", text, still, {"angle": angles})
 
@@ -374,7 +371,7 @@ def parts_of(
 
     `form` and `jumps` as jumps.with_switch_states gives them; `time`: the symbol in them.
     """
-    eom, reduction = form.equations.mapped(written_out), form.reduction
+    eom, reduction = form.equations, form.reduction
     more: dict[str, Any] = {"tangents": tangents, "time": time}
     if reduction is None:
         return (Parts(eom, "", form.formulation, eom.constraints, jumps, **more),)

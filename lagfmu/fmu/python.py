@@ -15,6 +15,7 @@ from .. import names
 from ..errors import BuildError
 from ..interface.variables import Variable, VariableTable
 from ..methods import IN_PYTHON, NUMBERS
+from ..numeric.closed import OPERATIONS
 from ..prepare.prepare import Prepared
 from .archive import pack, version
 from .description import model_description
@@ -32,7 +33,10 @@ SHIPPED = (
     "fmu/slave",
 )  # what travels in the FMU, besides the generated script
 
-VOCABULARY = ("Cubic", "Embedding", "Lookups", "Own", "Row", "System")  # of generated equations
+VOCABULARY = (  # of generated equations
+    *("Cubic", "Embedding", "Lookups", "Own", "Row", "System"),
+    *OPERATIONS,
+)
 
 CAPABILITIES = {
     "needsExecutionTool": "false",

@@ -13,6 +13,7 @@ from collections.abc import Mapping
 import sympy as sp
 
 from ..errors import DerivationError
+from ..model.attitude import ClosedFunction
 from ..model.elements import Expr
 
 CONSTANT_PIECES = (
@@ -40,6 +41,8 @@ class Differential:
     def _of(self, e: Expr) -> Expr:
         if e.is_Add:
             return sp.Add(*(self(a) for a in e.args))
+        if isinstance(e, ClosedFunction):
+            return e.changed(self)
         if e.is_Mul:
             return sp.Add(
                 *(

@@ -398,8 +398,8 @@ def derive(model: Model) -> EquationsOfMotion:
     places = frozenset(j for j, s in enumerate(q) if s in angles)
     closed = attitudes(model, table)
     moving = Kinematics(q, v, tuple(r.xreplace(closed.symbols) for r in qdot), TIME, rates, places)
-    moving = moving.beside(closed.rates)
-    clock = _Clock(moving.q, moving.rates, rates)
+    moving = moving.beside(closed.positions)
+    clock = _Clock(moving.q, moving.rates, {**rates, **closed.rates})
     problems: list[str] = []
 
     energy = model.energy_expression.xreplace(table).xreplace(closed.symbols)
@@ -412,18 +412,20 @@ def derive(model: Model) -> EquationsOfMotion:
     gamma: list[Expr] = []
     f: list[Expr | None] = []
     slopes = {s: Differential({s: sp.S.One}) for s in v}
+    opened = {s: a for a, s in closed.symbols.items()}
     along = Differential({**clock.rates, TIME: sp.S.One}) if closed.symbols else None
     for k, constraint in enumerate(model.constraints):
-        expression = sp.sympify(constraint.expression).xreplace(table).xreplace(closed.symbols)
+        expression, bend = sp.sympify(constraint.expression).xreplace(table), None
+        if not isinstance(constraint, Tie):
+            expression = expression.xreplace(closed.symbols)
         holonomic = not isinstance(constraint, Nonholonomic)
         f.append(expression if holonomic else None)
-        bend = None
         if isinstance(constraint, Tie):
-            rate, bend = (e.xreplace(table).xreplace(closed.symbols) for e in constraint.rates)
+            rate, bend = (e.xreplace(table) for e in constraint.rates)
             row, drift = _pfaffian(constraint, rate, v, problems, slopes)
         elif along:  # by factors as they stand: products of sums stay short
             rate = along(expression) if holonomic else expression
-            row, drift = _pfaffian(constraint, rate, v, problems, slopes)
+            row, drift = _pfaffian(constraint, rate.xreplace(opened), v, problems, slopes)
             bend = along(rate)
         elif holonomic:
             row, drift = _along(expression, moving), moving.along_time(expression)
@@ -460,8 +462,7 @@ def derive(model: Model) -> EquationsOfMotion:
         frictions=tuple(_friction(f, table) for f in model.frictions),
         outputs=tuple(_changed(o, lambda e: e.xreplace(table)) for o in model.outputs),
     )
-    back = {s: a for a, s in closed.symbols.items()}
-    return made.mapped(lambda e: e.xreplace(back)) if back else made
+    return made.mapped(lambda e: e.xreplace(opened)) if opened else made
 
 
 def _friction(f: Friction, table: dict[Expr, Expr]) -> FrictionLaw:

@@ -8,6 +8,8 @@ Everything that is wrong with a model (`check.py`) is reported at once, in one M
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -100,6 +102,13 @@ class Model(ModelFields, Displayed):
         problems = problems_of(self)
         if problems:
             raise ModelError(str(self.name), problems)
+
+    def started(self, start: Mapping[Expr, float], rough: Sequence[Expr]) -> Model:
+        """The same that starts at these numbers, finite and in SI; nothing is checked again."""
+        made = copy(self)
+        object.__setattr__(made, "start", dict(start))
+        object.__setattr__(made, "rough", tuple(rough))
+        return made
 
     @cached_property
     def units(self) -> dict[Expr, Unit]:

@@ -25,7 +25,7 @@ from sympy.functions.elementary.trigonometric import (
 from sympy.physics.mechanics import dynamicsymbols
 
 from ..errors import UnitError
-from .attitude import Attitude
+from .attitude import Attitude, Carried
 from .elements import Expr
 
 BASE = ("kg", "m", "s", "A", "K", "mol", "cd")
@@ -409,6 +409,8 @@ class _Walker:
             self._agree(expr.args, None, expr)
         elif isinstance(expr, Attitude):
             self._pure(expr.quaternion, "quaternion", expr)
+        elif isinstance(expr, Carried):
+            return self._carried(expr)
         elif isinstance(expr, (sp.sign, sp.Heaviside)):
             self.walk(expr.args[0])
         elif isinstance(expr, _PURE):
@@ -420,6 +422,13 @@ class _Walker:
             )
             return None
         return ONE
+
+    def _carried(self, expr: Carried) -> Unit | None:
+        """The unit of the vector, times that of w in each order."""
+        order, _, e, s, w = expr.parts
+        self._pure(e, "quaternion", expr)
+        unit, rate = self._agree(s, None, expr), self._agree(w, None, expr) if order else ONE
+        return None if unit is None or rate is None else unit * rate**order
 
     def _spline(self, expr: Expr) -> Unit:
         """A table's value, or [y]/[x]^k of its derivative; its argument has the unit of its x."""

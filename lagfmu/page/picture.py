@@ -17,7 +17,7 @@ import sympy as sp
 
 from ..errors import BuildError, ModelError
 from ..mechanics.equations import TIME
-from ..model.attitude import Attitude, element
+from ..model.attitude import Attitude, ClosedFunction
 from ..model.closed_form import in_variables
 from ..model.elements import Expr
 from ..model.model import Model, Nonholonomic
@@ -40,6 +40,7 @@ from ..model.picture import (
 )
 from ..model.reactions import multiplier
 from ..model.spline import SplineBase
+from ..numeric.closed import rotation
 from ..numeric.cubic import Cubic
 from ..prepare.prepare import Prepared
 
@@ -66,7 +67,7 @@ OPERATIONS: Mapping[str, Callable[..., Any]] = {
     **{name: getattr(np, name) for name in ("exp", "log", "sign", "abs")},
     **{"asin": np.arcsin, "acos": np.arccos, "atan": np.arctan, "atan2": np.arctan2},
     "spline": _spline,
-    "attitude": lambda i, j, *e: element(int(i), int(j), e) / sum(x**2 for x in e),
+    "attitude": lambda i, j, *e: rotation(e)[3 * int(i) + int(j)] / sum(x**2 for x in e),
     **{"min": lambda *x: np.minimum.reduce(x), "max": lambda *x: np.maximum.reduce(x)},
 }
 FIELDS = {  # kind -> names of its points, lists of points, single expressions, and the rest
@@ -208,6 +209,8 @@ def pack(expression: Expr, numbers: Mapping[str, Any] = {}) -> Packed:
         return ["spline", pack(expression.args[0], numbers), float(table.periodic), *rows]
     if isinstance(expression, Attitude):
         return ["attitude", *(pack(a, numbers) for a in expression.args)]
+    if isinstance(expression, ClosedFunction):
+        return pack(expression.opened(), numbers)
     operation = FUNCTIONS.get(expression.func)
     if operation is None:
         known = ", ".join(sorted(f for f in FUNCTIONS.values() if f.isalpha()))

@@ -1,35 +1,41 @@
 """What is alike up to the names of its symbols is computed by one C function: bodies and joints of a kind.
 
 The values of one owner (a joint A with the rows A.x, A.y, ...; a body) are written in symbols that are
-numbered by their places in the arguments.  Owners whose values are then the same expressions share a
-function, which is called in a loop over tables of places.  Expressions are so eliminated and printed once a
-kind, and code grows by a line of table for each further joint.
+numbered by their places in the arguments, with vectors that are fixed on bodies as data (model/alike.py).
+Owners whose values are then the same expressions share a function, which is called in a loop over tables of
+places and data.  Expressions are so eliminated and printed once a kind, and code grows by a line of table
+for each further joint.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Any
 
-import sympy as sp
-
+from ...model.alike import pattern
 from ...model.elements import Expr
+from ...names import read
 from ..parts import Arguments, Value
 
 SMALL = 60  # different nodes of one owner's values that are not worth a function
+DATA = "data"
+OF_JOINTS = frozenset(("angle", "position", "force", "torque"))  # what outputs and coordinates tell
 
 
 @dataclass
 class Kind:
     """`values` in the symbols `inputs`; of each owner of that kind, the places of what it reads and writes:
-    `reads` and `writes` name the arrays, in this order."""
+    `reads` and `writes` name the arrays, in this order.  Sources in the array DATA are numbers, or
+    expressions of parameters."""
 
     inputs: tuple[Expr, ...]
     values: tuple[Expr, ...]
     reads: tuple[str, ...]
     writes: tuple[str, ...]
     owners: list[str] = field(default_factory=list)
-    sources: list[tuple[int, ...]] = field(default_factory=list)
+    sources: list[tuple[Any, ...]] = field(default_factory=list)
     targets: list[tuple[int, ...]] = field(default_factory=list)
 
 
@@ -38,30 +44,50 @@ def kinds(
     results: Mapping[str, Sequence[Value]],
     costly: Callable[[Expr], bool],
 ) -> list[Kind]:
-    """Those of which there are two or more; none of values with calls of functions, which others share."""
+    """Those of which there are two or more; none of values with calls of functions that others share."""
     place = {s: (a, k) for a, group in arguments.items() for k, s in enumerate(group)}
-    order = {s: k for k, s in enumerate(place)}
-    found: dict[tuple[object, ...], Kind] = {}
-    for owner, own in _owners(results).items():
-        values = [value.expression for _, _, value in own]
-        nodes: dict[Expr, None] = {}
-        for e in values:
-            nodes |= nodes_of(e, nodes)
-        symbols = {node for node in nodes if node.is_Symbol}
-        if len(nodes) < SMALL or any(map(costly, nodes)) or not symbols <= order.keys():
+    nodes: dict[str, dict[Expr, None]] = {}
+    owners = _owners(results)
+    for owner, own in owners.items():
+        found = nodes[owner] = {}
+        for _, _, value in own:
+            found |= nodes_of(value.expression, found)
+    uses = Counter(e for found in nodes.values() for e in found if costly(e))
+    kinds: dict[object, Kind] = {}
+    for owner, own in owners.items():
+        if len(nodes[owner]) < SMALL or any(uses[e] > 1 for e in nodes[owner]):
             continue
-        ordered = sorted(symbols, key=order.__getitem__)
-        inputs = tuple(sp.Symbol(f"a{k}", real=True) for k in range(len(ordered)))
-        table = dict(zip(ordered, inputs, strict=True))
-        canonical = tuple(e.xreplace(table) for e in values)
-        reads = tuple(place[s][0] for s in ordered)
+        alike = pattern([value.expression for _, _, value in own], place.get, "p")
+        if alike is None:
+            continue
+        reads = tuple(group or DATA for group in alike.groups)
         writes = tuple(array for array, _, _ in own)
-        key = (canonical, reads, writes)
-        kind = found.setdefault(key, Kind(inputs, canonical, reads, writes))
+        kind = kinds.setdefault(
+            (alike.kind, writes), Kind(alike.symbols, alike.values, reads, writes)
+        )
         kind.owners.append(owner)
-        kind.sources.append(tuple(place[s][1] for s in ordered))
+        pairs = zip(alike.inputs, alike.groups, strict=True)
+        kind.sources.append(tuple(place[s][1] if group else s for s, group in pairs))
         kind.targets.append(tuple(k for _, k, _ in own))
-    return [kind for kind in found.values() if len(kind.owners) > 1]
+    return [_with_numbers(kind) for kind in kinds.values() if len(kind.owners) > 1]
+
+
+def _with_numbers(kind: Kind) -> Kind:
+    """The same with the data put in that are one number for all owners."""
+    columns = list(zip(*kind.sources, strict=True))
+    same = [
+        array == DATA and len(set(column)) == 1 and column[0].is_number
+        for array, column in zip(kind.reads, columns, strict=True)
+    ]
+    kept = [j for j, is_same in enumerate(same) if not is_same]
+    table = {kind.inputs[j]: columns[j][0] for j, is_same in enumerate(same) if is_same}
+    return replace(
+        kind,
+        inputs=tuple(kind.inputs[j] for j in kept),
+        values=tuple(e.xreplace(table) for e in kind.values),
+        reads=tuple(kind.reads[j] for j in kept),
+        sources=[tuple(source[j] for j in kept) for source in kind.sources],
+    )
 
 
 def nodes_of(e: Expr, seen: Mapping[Expr, None]) -> dict[Expr, None]:
@@ -82,6 +108,11 @@ def _owners(results: Mapping[str, Sequence[Value]]) -> dict[str, list[tuple[str,
     for array, group in results.items():
         for k, value in enumerate(group):
             if value.expression.free_symbols:
-                owner = value.place.partition(",")[0].partition(".")[0]
-                found.setdefault(owner, []).append((array, k, value))
+                found.setdefault(_owner(value.place), []).append((array, k, value))
     return found
+
+
+def _owner(place: str) -> str:
+    """A of "A.rx, b.omega.x", of "force.A.x [N]" and of "der(angle.A)"; b of "b.omega.x, b.omega.x"."""
+    first, *rest = read(place.partition(" [")[0].partition(", ")[0]).coordinate.split(".")
+    return rest[0] if rest and first in OF_JOINTS else first

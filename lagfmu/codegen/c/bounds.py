@@ -16,6 +16,7 @@ from sympy.core.relational import Relational
 from ...mechanics.differential import Differential
 from ...mechanics.equations import TIME, EquationsOfMotion
 from ...mechanics.jumps import Jumps
+from ...model.attitude import written_out
 from ...model.elements import Expr
 from ...model.model import Constraint, Contact
 
@@ -34,7 +35,7 @@ class _UnknownError(Exception):
 
 
 def rates(eom: EquationsOfMotion, constraints: Sequence[Constraint], jumps: Jumps) -> list[Expr]:
-    """d/dt of the indicators whose bounds are wanted: f of the contacts, then h of the jumps."""
+    """d/dt of the indicators whose bounds are wanted, written out: f of the contacts, then h of the jumps."""
     contacts = [k for k, c in enumerate(constraints) if isinstance(c, Contact)]
     entries = eom.G.todok().items()
     found = [
@@ -46,7 +47,7 @@ def rates(eom: EquationsOfMotion, constraints: Sequence[Constraint], jumps: Jump
         direction = {s: moving[s] for s in moving if s is TIME or str(s) in names}
         d = Differential(direction | {_plain(s): r for s, r in direction.items()})
         found += [d(s.h) for s in jumps.surfaces]
-    return found
+    return [*map(written_out, found)]
 
 
 def _plain(s: Expr) -> Expr:

@@ -18,6 +18,7 @@ from ...mechanics.jumps import with_switch_states
 from ...model.elements import Expr
 from ..parts import Function, Parts, parts_of
 from . import bounds
+from .closed import FUNCTIONS
 from .function import FILL, function
 from .printer import HELPERS, identifiers, table_name, table_text
 from .tables import Tables
@@ -61,7 +62,9 @@ def model_source(form: Form, tangents: bool = True) -> str:
         index += _index("coordinates that are stepped", whole[-1].eom.q)
     text = "\n".join(piece for parts in whole for piece in (*_embedding(parts), _system(parts)))
     text += POINTER.format(whole[-1].prefix)
-    helpers = [code for name, code in {**HELPERS, "fill": FILL}.items() if f"{name}(" in text]
+    helpers = [
+        code for name, code in {**HELPERS, **FUNCTIONS, "fill": FILL}.items() if f"{name}(" in text
+    ]
     helpers += [table_text(s) for s in eom.model.splines if f"&{table_name(s)}," in text]
     model = eom.model
     description = f": {model.description}" if model.description else ""

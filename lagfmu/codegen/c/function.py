@@ -15,9 +15,12 @@ from textwrap import wrap
 import sympy as sp
 from sympy.logic.boolalg import Boolean
 
+from ...model.attitude import ClosedFunction
+from ...model.closing import Closing
 from ...model.elements import Expr
 from ..parts import Value
-from .alike import Kind, kinds, nodes_of
+from .alike import DATA, Kind, kinds, nodes_of
+from .closed import calls
 from .printer import POWER, Printer
 from .subexpressions import Names, common_subexpressions
 
@@ -55,7 +58,8 @@ def function(
     """
     statements = [s for array, group in results.items() for s in _statements(array, group)]
     blocks = list(_blocks(statements))
-    if len(blocks) > 1 and (found := kinds(arguments, results, _costly)):
+    large = len(blocks) > 1 or any(s.value.has(ClosedFunction) for s in statements)
+    if large and (found := kinds(arguments, results, _costly)):
         return _in_loops(name, doc, arguments, results, found, names)
     if len(blocks) > 1:
         return _in_blocks(name, doc, arguments, list(results), blocks, names)
@@ -90,7 +94,9 @@ def _in_loops(
     elif blocks:
         text = _define(f"{name}_rest", arguments, list(results), statements, names)
         parts.append(f"/* {head} */\n{text}")
-    calls = ""
+    data = {x: k for k, x in enumerate(dict.fromkeys(_data(found)))}
+    text, parameters = _constants(data, arguments, names)
+    calls = text
     if blocks:
         calls += _lines(f"    {name}_rest(", [*arguments, *results], ", ", ");")
     for number, kind in enumerate(found, 1):
@@ -100,12 +106,31 @@ def _in_loops(
         text = _define(title, {"a": kind.inputs}, ["y"], values, local)
         owners = " ".join(wrap(", ".join(kind.owners), 90, max_lines=1, placeholder=" ..."))
         parts.append(f"/* Of {owners}. */\n{text}")
-        calls += _loop(title, kind, arguments, names)
-    used = {a for kind in found for a in (*kind.reads, *kind.writes)}
+        calls += _loop(title, kind, arguments, names, data)
+    used = {a for kind in found for a in (*kind.reads, *kind.writes)} | parameters
     used |= {*arguments, *results} if blocks else set()
     silence = _silence([a for a in (*arguments, *results) if a not in used])
     signature = _signature(name, arguments, names, list(results))
     return "\n".join([*parts, f"/* {doc} */\n{signature}{silence}{calls}}}\n"])
+
+
+def _data(found: Sequence[Kind]) -> Iterator[Expr]:
+    """The sources in DATA."""
+    for kind in found:
+        for source in kind.sources:
+            yield from (x for x, a in zip(source, kind.reads, strict=True) if a == DATA)
+
+
+def _constants(
+    data: Mapping[Expr, int], arguments: Mapping[str, Sequence[Expr]], names: Mapping[Expr, str]
+) -> tuple[str, set[str]]:
+    """The array DATA, and the arguments that stand in it."""
+    places = {s: f"{a}[{k}]" for a, group in arguments.items() for k, s in enumerate(group)}
+    symbols = set().union(*(e.free_symbols for e in data))
+    printer = Printer({s: places[s] for s in symbols})
+    const = "const" if symbols else "static const"
+    text = data and _lines(f"    {const} double {DATA}[] = {{", [*map(printer, data)], ", ", "};")
+    return text or "", {places[s].partition("[")[0] for s in symbols}
 
 
 def _loop(
@@ -113,21 +138,27 @@ def _loop(
     kind: Kind,
     arguments: Mapping[str, Sequence[Expr]],
     names: Mapping[Expr, str],
+    data: Mapping[Expr, int],
 ) -> str:
     """Calls of the function of a kind, for each of its owners."""
     count, inputs, outputs = len(kind.owners), len(kind.reads), len(kind.writes)
+    sources = [
+        [data[x] if a == DATA else x for x, a in zip(source, kind.reads, strict=True)]
+        for source in kind.sources
+    ]
     tables = "".join(
         f"        static const int {label}[{count}][{size}] = {{\n"
         + "".join(_lines("            {", [*map(str, row)], ", ", "},", " " * 13) for row in rows)
         + "        };\n"
         for label, size, rows in (
-            ("from", inputs, kind.sources),
+            ("from", inputs, sources),
             ("to", outputs, kind.targets),
         )
     )
     gather = scatter = ""
     for array, first, end in _runs(kind.reads):
-        source = array if _scalar(array, arguments[array], names) else f"{array}[from[k][j]]"
+        scalar = array != DATA and _scalar(array, arguments[array], names)
+        source = array if scalar else f"{array}[from[k][j]]"
         gather += f"            for (int j = {first}; j < {end}; j++) a[j] = {source};\n"
     for array, first, end in _runs(kind.writes):
         scatter += f"            for (int j = {first}; j < {end}; j++) {array}[to[k][j]] = y[j];\n"
@@ -279,6 +310,8 @@ def _shared(blocks: Sequence[Sequence[_Statement]]) -> list[Expr]:
 
 
 def _costly(e: Expr) -> bool:
+    if isinstance(e, ClosedFunction):
+        return False
     if e.is_Pow:
         return not e.exp.is_Integer or abs(e.exp) > POWER
     return bool(e.is_Function) and not isinstance(e, Boolean)
@@ -293,7 +326,11 @@ def _body(
     values = [s.value for s in statements]
     symbols: set[Expr] = set().union(*(e.free_symbols for e in values)) if values else set()
     local = {s: names[s] for s in symbols}
-    common, reduced = common_subexpressions(values, Names(local))
+    taken = Names(local)
+    closing = Closing(taken.array)
+    values, places = closing.opened(values)
+    local |= {s: f"{a}[{k}]" for s, (a, k) in places.items()}
+    common, reduced = common_subexpressions(values, taken)
     printer = Printer(local)
     used = {s.array for s in statements}
     lines = []
@@ -306,6 +343,7 @@ def _body(
             continue
         declared = [f"{names[s]} = {argument}[{k}]" for k, s in wanted]
         lines.append(_lines("    const double ", declared, ", ", ";"))
+    lines += [_lines("    ", [call], "") for call in calls(closing.steps, printer)]
     for s, e in common:
         lines.append(_lines("    ", [f"const double {local[s]} = {printer(e)};"], ""))
     if lines:

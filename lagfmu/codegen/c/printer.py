@@ -91,6 +91,7 @@ OURS = """
     sign heaviside cubic Cubic
     Kind Formulation Row System Plan Type Role Place Variable near far small interface
     linux unix i386 main Friction coefficients load normal
+    data rotation rotation_change turned turned_change across across_change levers
 """
 TAKEN = frozenset(
     [

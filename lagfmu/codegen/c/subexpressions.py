@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import count
 
 import sympy as sp
 from sympy.logic.boolalg import Boolean
@@ -30,6 +31,12 @@ class Names:
         symbol = sp.Symbol(f"common {text}", real=True)
         self.local[symbol] = text
         return symbol
+
+    def array(self, letter: str) -> str:
+        """A name for an array."""
+        text = next(t for k in count() if (t := f"{letter}{k}") not in self.taken)
+        self.taken.add(text)
+        return text
 
     def describe(self, symbol: Expr, e: Expr) -> None:
         """sin(theta) is called sin_theta."""

@@ -11,6 +11,7 @@ from ...mechanics.equations import TIME, EquationsOfMotion
 from ...mechanics.form import Form
 from ...mechanics.jumps import with_switch_states
 from ...model.elements import Expr
+from ...numeric.closed import OPERATIONS
 from ...numeric.cubic import Cubic
 from ...numeric.system import System
 from ..parts import Function, Parts, parts_of
@@ -21,7 +22,7 @@ def source(form: Form) -> str:
     """Python text that defines SYSTEM, the numeric form of the equations.
 
     It needs the names System, Row, Own, Friction, Lookups and Embedding of `lagfmu.numeric.system`, and Cubic
-    where there are tables.
+    where there are tables, and the functions of numeric/closed.py where there are bodies in space.
     """
     form, jumps = with_switch_states(form)
     whole = parts_of(form, jumps)
@@ -64,6 +65,7 @@ def compile_system(text: str) -> System:
         "Row": vocabulary.Row,
         "Embedding": vocabulary.Embedding,
         "Friction": vocabulary.Friction,
+        **OPERATIONS,
     }
     exec(compile(text, "<lagfmu equations>", "exec"), scope)
     system: System = scope["SYSTEM"]

@@ -9,18 +9,22 @@ import builtins
 import keyword
 import math
 from collections.abc import Mapping, Sequence
+from itertools import count
 from typing import Any
 
 import sympy as sp
 from sympy.printing.pycode import PythonCodePrinter
 
 from ...errors import DerivationError
+from ...model.closing import Closing
 from ...model.elements import Expr
+from ...numeric.closed import OPERATIONS
 from ..identifier import identifier
+from .closed import calls
 
 ARGUMENTS = (
     *("t", "q", "v", "u", "p", "s", "sdot", "M", "F", "G", "nu", "gamma", "f", "h", "e", "energy"),
-    *("vdot", "lam", "Q", "w", "coefficients", "load", "normal", "places"),
+    *("vdot", "lam", "Q", "w", "coefficients", "load", "normal", "places", *OPERATIONS),
 )
 
 TABLE = "table_of_"
@@ -91,11 +95,13 @@ def function(
     `arguments` maps an argument to the symbols it is unpacked into, one that is passed as it is to the one
     symbol that has its name.
     """
-    printer = _Printer(names)
     flat = [sp.sympify(e) for group in results.values() for e in group]
     used = set().union(*(e.free_symbols for e in flat)) if flat else set()
-    free = _fresh(set(names.values()))
-    common, reduced = sp.cse(flat, symbols=free, order="none", list=True)
+    taken = {*names.values(), *ARGUMENTS}
+    closing = Closing(lambda letter: _array(letter, taken))
+    flat, places = closing.opened(flat)
+    printer = _Printer({**names, **{s: f"{a}[{k}]" for s, (a, k) in places.items()}})
+    common, reduced = sp.cse(flat, symbols=_fresh(taken), order="none", list=True)
     lines = [f"def {name}({', '.join(arguments)}):", f'    """{doc}"""']
     for argument, symbols in arguments.items():
         if [names[s] for s in symbols] == [argument]:
@@ -104,6 +110,7 @@ def function(
         if any(w != "_" for w in wanted):
             lines.append(f"    {', '.join(wanted)}{',' if len(wanted) == 1 else ''} = {argument}")
     try:
+        lines += [f"    {call}" for call in calls(closing.steps, printer.doprint)]
         lines += [f"    {s} = {printer.doprint(e)}" for s, e in common]
         values = iter([printer.doprint(e) for e in reduced])
     except sp.printing.codeprinter.PrintMethodNotImplementedError as error:
@@ -123,6 +130,13 @@ def _assignment(label: str, items: Sequence[str]) -> list[str]:
     if len(line) <= 100:
         return [line]
     return [f"    {label} = [", *(f"        {item}," for item in items), "    ]"]
+
+
+def _array(letter: str, taken: set[str]) -> str:
+    """A name for an array."""
+    text = next(t for k in count() if (t := f"{letter}{k}") not in taken)
+    taken.add(text)
+    return text
 
 
 def _fresh(taken: set[str]) -> Any:

@@ -75,6 +75,7 @@ except Exception as error:  # a NumPy of another Python, or an old one, fails in
         """In place of what the script builds of the equations."""
 
     Cubic = Embedding = Lookups = Own = Row = System = _nothing  # type: ignore[misc,assignment]
+    across = levers = rotation = turned = _nothing  # type: ignore[assignment]
 
 __all__ = [
     "Cubic",
@@ -86,4 +87,8 @@ __all__ = [
     "Row",
     "System",
     "Variable",
+    "across",
+    "levers",
+    "rotation",
+    "turned",
 ]
