@@ -12,7 +12,7 @@ from tops import E, W, chain, reference, top, turning
 
 from lagfmu import Holonomic, Model, Nonholonomic, Parameter, derive, rotation_matrix, simulate
 from lagfmu.errors import ModelError
-from lagfmu.testing import Form, lower, model_source, written_out
+from lagfmu.testing import Carried, Differential, Form, lower, model_source, written_out
 
 X, Y, PHI, R, S, U = dynamicsymbols("x y phi vr vt u")
 m, k = sp.symbols("m k", positive=True)
@@ -205,6 +205,27 @@ def test_rotation_matrices_closed_or_written_out_are_the_same_equations() -> Non
     ]
     for closed, written in zip(*found, strict=True):
         np.testing.assert_allclose(closed, written, rtol=0, atol=1e-13)
+
+
+def test_vectors_on_a_body_are_differentiated_as_their_polynomials_are() -> None:
+    """R s, R (w x s) and R (w x (w x s)) change with the attitude, with w and with s as their polynomials do,
+    for the numbers of a tangent and for SymPy's derivative by a symbol."""
+    s = sp.symbols("s:3", real=True)
+    symbols = (*E, *W, *s)
+    table = {a: sp.Symbol(f"a{i}", real=True) for i, a in enumerate(symbols)}
+    change = {a: sp.Symbol(f"da{i}", real=True) for i, a in enumerate(table.values())}
+    generator = np.random.default_rng(7)
+    at = {a: generator.normal() for a in (*table.values(), *change.values())}
+    for order in range(3):
+        vector = Carried(order, 1, *E, *s, *(W if order else (0, 0, 0))).xreplace(table)
+        whole = sum(written_out(vector).diff(a) * da for a, da in change.items())
+        found = written_out(Differential(change)(vector))
+        assert float(found.xreplace(at)) == pytest.approx(float(whole.xreplace(at)), rel=1e-12)
+        for a in table.values():
+            slope = float(written_out(vector.diff(a)).xreplace(at))
+            assert slope == pytest.approx(
+                float(written_out(vector).diff(a).xreplace(at)), abs=1e-12
+            )
 
 
 def test_joints_of_a_kind_share_their_code() -> None:

@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lagfmu.bodies import Revolute, from_urdf
+from lagfmu import derive
+from lagfmu.bodies import Revolute, from_urdf, mechanism
 from lagfmu.errors import ModelError
+from lagfmu.testing import Form, model_source
 
 ARM = Path(__file__).parent.parent / "models" / "arm.urdf"
 INERTIA = '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
@@ -112,3 +114,12 @@ def test_a_file_that_is_no_urdf_is_refused(tmp_path: Path, text: str) -> None:
         from_urdf(path)
     with pytest.raises(ModelError, match="No such file"):
         from_urdf(tmp_path / "none.urdf")
+
+
+def test_hinges_share_their_code_however_their_markers_are_turned() -> None:
+    """The hinges between the arm's links have axes and points of their own, some oblique: data of one
+    function, for the equations and for their changes."""
+    arm = from_urdf(ARM, limits=False)
+    text = model_source(Form(derive(mechanism("Arm", bodies=arm.bodies, joints=arm.joints))))
+    assert text.count("/* Of j2, j3, j4, j5, j6. */\nstatic void dynamics_kind_") == 1
+    assert text.count("/* Of j2, j3, j4, j5, j6. */\nstatic void tangent_kind_") == 1

@@ -145,7 +145,7 @@ class Carried(ClosedFunction):
         """In elements of R."""
         order, i, e, s, w = self.parts
         for _ in range(order):
-            s = across(w, s)
+            s = tuple(across(w, s))
         return sp.Add(*(Attitude(i, j, *e) * x for j, x in enumerate(s) if x != 0))
 
     def changed(self, d: Change) -> Expr:
