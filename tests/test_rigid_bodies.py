@@ -43,9 +43,11 @@ def test_a_heavy_top_rests_on_its_ball_joint_with_m_a_minus_g(built):
     np.testing.assert_allclose(force, weight, rtol=0, atol=20 * ALLOWED)
 
 
-def test_a_body_near_its_middle_axis_flips_when_jacobis_functions_say(built):
+@pytest.mark.parametrize("tolerance", [1e-6, 1e-9, 1e-12])
+def test_a_body_near_its_middle_axis_flips_when_jacobis_functions_say(built, tolerance):
     """Near the middle axis a free body turns over each 2 K(k)/p (Landau & Lifshitz, Mechanics, sect. 37);
-    over 1,000 turns its angular momentum in space and its energy stay within 100 tolerances."""
+    over 1,000 turns its angular momentum in space and its energy stay within 100 tolerances, the 334th flip
+    within 20,000 of them in seconds."""
     A, B, C = J = np.array([1.0, 2.0, 3.0])
     turn, lean = 5.0, 0.05  # rad/s about the middle axis, and about the third
     energy, momentum = B * turn**2 + C * lean**2, (B * turn) ** 2 + (C * lean) ** 2
@@ -54,21 +56,21 @@ def test_a_body_near_its_middle_axis_flips_when_jacobis_functions_say(built):
     quarter, flips, looks = ellipkm1(complementary) / p, 334, 8
     body = Body("body", 1.0, tuple(J))
     model = mechanism("FreeBody", bodies=[body], start={"body.omega": (0.0, -turn, lean)})
-    tolerance = 1e-10
     run = simulate(
         built(model),
         stop_time=2 * flips * quarter,
         step_size=quarter / looks,
         tolerance=tolerance,
+        start_values={"solver.method": "dop853"},
     )
     assert run["time"][-1] * turn > 1000 * 2 * np.pi
     w = np.stack([run[f"body.omega.{x}"] for x in "xyz"], axis=1)
     flip = slice(looks, None, 2 * looks)
     late = w[flip, 1] / ((C - A) / B * w[flip, 0] * w[flip, 2])
     assert len(late) == flips
-    np.testing.assert_allclose(late, 0, rtol=0, atol=2e-6)
+    np.testing.assert_allclose(late, 0, rtol=0, atol=2e4 * tolerance)
     sn, *_ = ellipj(p * run["time"] - p * quarter, 1 - complementary)
-    np.testing.assert_allclose(w[:, 1], turn * sn, rtol=0, atol=2e-5)
+    np.testing.assert_allclose(w[:, 1], turn * sn, rtol=0, atol=2e5 * tolerance)
     e = np.stack([run[f"body.orientation.{x}"] for x in "wxyz"], axis=1)
     in_space = np.array([rotation(q) @ (J * v) for q, v in zip(e, w, strict=True)])
     allowed = 100 * tolerance * np.sqrt(momentum)
