@@ -7,6 +7,7 @@ import re
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -15,10 +16,11 @@ import numpy as np
 import pytest
 from conftest import FILES, Fmu, of_each_kind
 from fmpy.build import build_platform_binary
+from fmpy.fmi1 import FMICallException
 from fmpy.validation import validate_fmu
 
 import lagfmu
-from lagfmu.testing import Plan, RefusalError, Session, run_batch
+from lagfmu.testing import Face, Plan, Prepared, RefusalError, Session, run_batch, write
 
 COMBINATIONS = list(itertools.product((False, True), repeat=2))  # event mode, early return
 COLUMNS = ("r", "theta", "der(theta)", "lambda.surface")
@@ -104,6 +106,27 @@ def test_many_runs_in_one_call_are_those_of_fmi_2(native_fmu: Fmu, fmi3_fmu: Fmu
             found.append(run_batch(session, plan, np.array([[0.01], [0.1], [0.3]])).result)
     assert found[0].tobytes() == found[1].tobytes()
     assert (np.diff(found[0][:, 0]) < 0).all()  # the lower it begins, the sooner it leaves
+
+
+def test_an_array_holds_what_its_members_are(
+    prepared: Callable[[str], Prepared], tmp_path: Path
+) -> None:
+    """Q.N is (Q.x, Q.y), at each point, beside scalars in one call; nothing can be set in it."""
+    face = Face(3, arrays=True)
+    path = write(prepared("PendulumCartesian"), tmp_path, target="native", face=face)
+    run = fmpy.simulate_fmu(str(path), fmi_type="CoSimulation", stop_time=1.0)
+    assert run["Q.N"].shape == (len(run), 2)
+    assert run["Q.N"].tobytes() == np.stack([run["Q.x"], run["Q.y"]], axis=1).tobytes()
+    assert run["lambda.'N/m'"][:, 0].tobytes() == run["lambda.rod"].tobytes()
+    with Session(path) as session:
+        session.begin()
+        assert "Q.N" not in session.outputs
+        slave, array = session.instance, session.reference["Q.N"]
+        assert list(slave.getFloat64([array, session.reference["Q.x"]], nValues=3))[2] != 0.0
+        with pytest.raises(FMICallException):
+            slave.setFloat64([array], [1.0, 2.0])
+        with pytest.raises(FMICallException):
+            slave.getFloat64([array], nValues=1)
 
 
 def test_verify_holds_its_closed_forms(fmi3_fmu: Fmu) -> None:

@@ -107,6 +107,12 @@ def dependencies(table: VariableTable) -> tuple[Dependencies, Dependencies]:
     return of_start, of_running
 
 
+def arrays(table: VariableTable) -> Dependencies:
+    """What is in each, by value references."""
+    places = table.position
+    return {places[v.name]: [places[n] for n in v.members] for v in table.variables if v.members}
+
+
 def build_description(identifier: str, sources: Sequence[str]) -> bytes:
     """sources/buildDescription.xml: what a recompilation of the library `identifier` needs."""
     root = Element("fmiBuildDescription", {"fmiVersion": VERSION})

@@ -17,7 +17,7 @@ from .archive import pack, tool
 from .capabilities import interfaces_of
 from .compiler import HOST, Platform, chosen, compile_libraries, host, is_first
 from .description import guid_of, model_description
-from .description3 import build_description, dependencies
+from .description3 import arrays, build_description, dependencies
 from .face import USUAL, Face
 from .target import missing_for_native
 from .trial import check_start
@@ -128,7 +128,8 @@ def sources_of(prepared: Prepared, listed: bool = True, face: Face = USUAL) -> S
     }
     gone |= generated.keys() | {file for file in everything if not face.holds(file)}
     if face.fmi == 3:
-        generated["interface.c"] = interface_source(scene.name, *dependencies(table)).encode()
+        told = (*dependencies(table), arrays(table))
+        generated["interface.c"] = interface_source(scene.name, *told).encode()
     runtime = {file: text for file, text in everything.items() if file not in gone}
     watched = len(system.contacts) + len(system.switches) + 2 * len(system.frictions)
     interfaces = interfaces_of(prepared, face)

@@ -1,4 +1,4 @@
-/* dependencies.h -- what variables depend on; interface.c is generated from the same table as modelDescription.xml. */
+/* dependencies.h -- what variables depend on, and what arrays hold; interface.c is generated from the same table as modelDescription.xml. */
 #ifndef LAGFMU_DEPENDENCIES_H
 #define LAGFMU_DEPENDENCIES_H
 
@@ -16,6 +16,7 @@ typedef struct {
 } Unknowns;
 
 SHARED const Unknowns INITIAL_UNKNOWNS, RUNNING_UNKNOWNS; /* before the end of the initialization, and after it */
+SHARED const Unknowns ARRAYS; /* likewise: what is in the array of that value reference, VARIABLE_COUNT and on */
 SHARED const unsigned *const KNOWNS;
 
 #endif

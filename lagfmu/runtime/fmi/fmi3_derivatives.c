@@ -71,8 +71,8 @@ fmi3Status fmi3GetVariableDependencies(fmi3Instance instance, fmi3ValueReference
     const Unknown *unknown = find_unknown(instance, call, dependent);
     if (unknown == NULL) return fmi3Error;
     if (nDependencies != (size_t)unknown->count) {
-        (void)fail(&text, "%s: room for %lu dependencies, '%s' has %d", call->name, (unsigned long)nDependencies,
-                   VARIABLES[dependent].name, unknown->count);
+        (void)fail(&text, "%s: room for %lu dependencies, value reference %u has %d", call->name,
+                   (unsigned long)nDependencies, (unsigned)dependent, unknown->count);
         return component_refuse(instance, text.text);
     }
     if (nDependencies > 0 && (elementIndicesOfDependent == NULL || independents == NULL ||

@@ -1,4 +1,5 @@
 /* fmi3_values.c -- getting and setting variables. */
+#include "dependencies.h"
 #include "fmi3_component.h"
 
 SHARED_VALUE const Group FLOAT64 = {"Float64", 1u << TYPE_REAL, AS_DOUBLE};
@@ -41,7 +42,41 @@ static fmi3Status set(Component *c, const Call *call, const Group *group, const 
                    nValues);                                                                                  \
     }
 
-FMI3_ACCESS(Float64, &FLOAT64)
+/* What is in an array; NULL of a scalar. */
+static const Unknown *array_at(fmi3ValueReference reference) {
+    const unsigned k = reference - (unsigned)VARIABLE_COUNT;
+    return reference >= (unsigned)VARIABLE_COUNT && k < (unsigned)ARRAYS.count ? &ARRAYS.rows[k] : NULL;
+}
+
+/* Of an array all that is in it, in its place among the values. */
+fmi3Status fmi3GetFloat64(fmi3Instance instance, const fmi3ValueReference valueReferences[],
+                          size_t nValueReferences, fmi3Float64 values[], size_t nValues) {
+    const Call *call = FMI3_CALL(fmi3GetFloat64);
+    size_t expected = 0, at = 0;
+    int status = CALL_OK;
+    if (ARRAYS.count == 0 || nValueReferences == 0 || valueReferences == NULL || values == NULL)
+        return get(instance, call, &FLOAT64, valueReferences, nValueReferences, values, nValues);
+    for (size_t k = 0; k < nValueReferences; k++) {
+        const Unknown *array = array_at(valueReferences[k]);
+        expected += array == NULL ? 1 : (size_t)array->count;
+    }
+    if (component_forbids(instance, call) || component3_miscounts(instance, call, nValues, expected))
+        return fmi3Error;
+    for (size_t k = 0; k < nValueReferences && status == CALL_OK; k++) {
+        const Unknown *array = array_at(valueReferences[k]);
+        const unsigned *held = array == NULL ? &valueReferences[k] : &KNOWNS[array->first];
+        const size_t count = array == NULL ? 1 : (size_t)array->count;
+        status = component_get(instance, call, &FLOAT64, held, count, values + at);
+        at += count;
+    }
+    return status;
+}
+
+fmi3Status fmi3SetFloat64(fmi3Instance instance, const fmi3ValueReference valueReferences[],
+                          size_t nValueReferences, const fmi3Float64 values[], size_t nValues) {
+    return set(instance, FMI3_CALL(fmi3SetFloat64), &FLOAT64, valueReferences, nValueReferences, values, nValues);
+}
+
 FMI3_ACCESS(Int32, &INT32)
 FMI3_ACCESS(Int64, &INT64)
 FMI3_ACCESS(Boolean, &BOOL)
