@@ -26,6 +26,7 @@ from typing import Any
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy: the processes share the cores
 
+import fmi3
 import pytest
 from browser import Page, chromium
 from fmi2 import Library
@@ -174,7 +175,8 @@ def fmi3_fmu(prepared: Callable[[str], Prepared], shared_folder: Path) -> Fmu:
 
 @pytest.fixture(scope="session")
 def built(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
-    """built(model), built(model, scene, closed_forms, target): the FMU of a test's own model, built once."""
+    """built(model), built(model, scene, closed_forms, target, fmi=3): the FMU of a test's own model, built
+    once."""
     made: list[tuple[tuple[Any, ...], Path]] = []
 
     def get(
@@ -182,15 +184,17 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
         scene: Scene | None = None,
         closed_forms: Sequence[Any] = (),
         target: str = "native",
+        **interface: Any,
     ) -> Path:
         if target == "native" and find_compiler() is None:
             pytest.skip("no C compiler on this machine: native FMUs are not tested")
-        wanted = model, scene or Scene(model.name), tuple(closed_forms), target
+        wanted = model, scene or Scene(model.name), tuple(closed_forms), target, interface
         for known, path in made:
             if known == wanted:
                 return path
         folder = tmp_path_factory.mktemp("own")
-        made.append((wanted, build_fmu(model, folder, *wanted[1:], check=False)))
+        path = build_fmu(model, folder, *wanted[1:4], check=False, **interface)
+        made.append((wanted, path))
         return made[-1][1]
 
     return get
@@ -205,6 +209,19 @@ def library(
     def get(fmu: str | Path) -> Library:
         path = native_fmu(fmu) if isinstance(fmu, str) else fmu
         return Library(path, tmp_path_factory.mktemp("library"))
+
+    return cache(get)
+
+
+@pytest.fixture(scope="session")
+def library3(
+    fmi3_fmu: Fmu, tmp_path_factory: pytest.TempPathFactory
+) -> Callable[[str | Path], fmi3.Library]:
+    """library3(NAME), library3(path): the same of FMI 3.0."""
+
+    def get(fmu: str | Path) -> fmi3.Library:
+        path = fmi3_fmu(fmu) if isinstance(fmu, str) else fmu
+        return fmi3.Library(path, tmp_path_factory.mktemp("library"))
 
     return cache(get)
 

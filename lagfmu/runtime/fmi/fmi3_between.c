@@ -15,6 +15,7 @@ static int is_intermediate(const Variable *v) {
         return ERROR_BARS == NULL; /* the finer run would have to be supplied once more */
     }
     if (v->role != ROLE_OUTPUT && v->role != ROLE_START) return 0;
+    if (v->place == AT_LOST) return s->frictions > 0; /* impacts make it jump, and nothing else changes it */
     if (is_of_event(v->place) || (v->place >= AT_PEAK_MAX && v->place <= AT_PEAK_MIN_TIME)) return 0;
     return v->place != AT_IMPULSE && v->place != AT_ERROR && v->place != AT_TIME && v->place != AT_INDICATOR;
 }
