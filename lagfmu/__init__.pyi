@@ -38,6 +38,7 @@ from .model.picture import (
 from .model.reactions import force_of_constraint, multiplier
 from .model.scene import Scene
 from .model.spline import Spline
+from .report.report import report
 from .study.fit.experiment import Experiment
 from .study.fit.result import Fit
 from .study.fit.solve import fit
@@ -92,6 +93,7 @@ __all__ = [
     "norm",
     "output",
     "play",
+    "report",
     "rotation_matrix",
     "show",
     "simulate",

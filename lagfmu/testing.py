@@ -99,6 +99,7 @@ from .page.wrapped import wrapped
 from .prepare.consistency import RedundantConstraintWarning
 from .prepare.prepare import Prepared, prepare
 from .prepare.starts import StartMovedWarning
+from .report import pdf as report_pdf
 from .study.fit import solve as fit_solve
 from .study.stress import runs, worker
 from .study.stress.bench import Bench, Finding

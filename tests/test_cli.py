@@ -234,6 +234,7 @@ MEANT_WRONG = {  # each command with what cannot be meant
     "stress": ("MODEL", "--scene", "Nothing"),
     "sweep": ("MODEL", "--vary", "nothing=1,2"),
     "fit": ("MODEL", "nothing.csv", "--free", "nothing"),
+    "report": ("MODEL", "--out", "report.docx"),
 }
 FITTED = ("measured.csv", "--free", "m")
 CANNOT_BE_READ = {  # and with a file that is not there, or is none

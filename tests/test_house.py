@@ -30,6 +30,7 @@ ROOMS = (  # each imports from those before it, and from no other
     "live",
     "verification",
     "study",
+    "report",
     "api",
     "cli",
     "testing",

@@ -55,7 +55,14 @@ TRIED_ELSEWHERE = (
     "SALib",
     "optuna",
 )  # with FMUs, as printed
-LONG = ("tradeoff", "stress", "sweep", "fit", "page")  # studies: tried in tests of their own
+LONG = (
+    "tradeoff",
+    "stress",
+    "sweep",
+    "fit",
+    "report",
+    "page",
+)  # studies: tried in tests of their own
 
 
 def quick(command: list[str]) -> bool:

@@ -13,6 +13,7 @@ from .commands.fit import fit
 from .commands.new import new
 from .commands.page import page
 from .commands.reference import reference
+from .commands.report import report
 from .commands.show import show
 from .commands.simulate import simulate
 from .commands.stress import stress
@@ -21,7 +22,20 @@ from .commands.tradeoff import tradeoff
 from .commands.verify import verify
 from .terminal import prepare_streams
 
-COMMANDS = (build, new, show, verify, reference, simulate, page, tradeoff, stress, sweep, fit)
+COMMANDS = (
+    build,
+    new,
+    show,
+    verify,
+    reference,
+    simulate,
+    page,
+    tradeoff,
+    stress,
+    sweep,
+    fit,
+    report,
+)
 EPILOG = "Exit codes: " + "; ".join(f"{code} {text}" for code, text in EXIT_CODES.items()) + "."
 
 app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False, epilog=EPILOG)

@@ -33,7 +33,7 @@ def print_verdicts(found: Verification) -> None:
     table = new_table(
         title, "statement", "largest error", "allowed", "points", "verdict", text=["statement"]
     )
-    for row, check in zip(found.rows(), found.checks, strict=True):
+    for row, check in found.told():
         colour = {"pass": "green", "FAIL": "bold red"}.get(check.verdict, "yellow")
         table.add_row(escape(row[0]), *row[1:4], f"[{colour}]{row[4]}[/]")
     print_whole(console, table)

@@ -86,6 +86,10 @@ class Verification:
         measured = [c for c in self.checks if c.points and c.allowed]
         return max(measured, key=lambda c: c.error / c.allowed, default=None)
 
+    def told(self) -> list[tuple[tuple[str, str, str, str, str], Check]]:
+        """Each check with its row."""
+        return list(zip(self.rows(), self.checks, strict=True))
+
     def rows(self) -> list[tuple[str, str, str, str, str]]:
         """(statement, largest error, allowed, at how many points, verdict) as text; no figures where it is
         yes or no."""

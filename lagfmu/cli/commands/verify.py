@@ -19,7 +19,7 @@ from ..options import (
     Tolerance,
     assignments,
 )
-from ..terminal import plainly
+from ..terminal import plainly, say_wrote
 
 
 def verify(
@@ -45,6 +45,10 @@ def verify(
     statements: Annotated[
         Path | None, typer.Option(help="TOML of statements that must hold, for any FMU.")
     ] = None,
+    html: Annotated[
+        Path | None,
+        typer.Option(help="Write a page with what was found, and pictures of what fails."),
+    ] = None,
     json: JsonFile = None,
     junit: JunitFile = None,
 ) -> None:
@@ -52,6 +56,8 @@ def verify(
 
     The exit code is the largest of all FMUs'.
     """
+    from ...fmu.write import write_whole
+    from ...report.report import verified
     from ...verification.junit import refused
     from ...verification.reference import Reference, read_table
     from ...verification.report import report
@@ -82,6 +88,10 @@ def verify(
             else:
                 done.append(report(str(fmu), found))
                 print_verdicts(found)
+        if html is not None:
+            page = verified([(r.file, r.found, r.error) for r in done])
+            write_whole(html, page.encode())
+            say_wrote(html)
         finish("verify", done, json, junit)
 
 

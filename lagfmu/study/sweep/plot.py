@@ -18,10 +18,17 @@ INK = "#1f5fa8"
 
 def plot(found: Any, path: Path) -> Path:
     """Draw the numbers that were kept.  Raises BuildError if the file cannot be written."""
+    from ...verification.figure import save
+
+    return save(figure_of(found), path)
+
+
+def figure_of(found: Any) -> Any:
+    """The same as a matplotlib Figure.  Raises SimulationError where no numbers were kept."""
     import matplotlib as mpl
     from matplotlib.figure import Figure
 
-    from ...verification.figure import STYLE, save
+    from ...verification.figure import STYLE
 
     names = numbers(found)
     if not names:
@@ -29,10 +36,8 @@ def plot(found: Any, path: Path) -> Path:
     dims = [d for d in found["status"].dims if d != "run"]
     with mpl.rc_context(STYLE | {"font.size": 9}):
         if "run" in found.dims or len(dims) > 2:
-            figure = _scatter(found, names, Figure)
-        else:
-            figure = _grid(found, names, dims, Figure)
-        return save(figure, path)
+            return _scatter(found, names, Figure)
+        return _grid(found, names, dims, Figure)
 
 
 def _drawn(found: Any, name: str) -> Any:

@@ -193,3 +193,50 @@ def dataset(
             called = f"{n}:trajectory" if n in coords else n  # its start value is what varies
             data[called] = ((*dims, "time"), values, {"units": layout.unit(n)})
     return xr.Dataset(data, coords, dict(layout.facts))
+
+
+def read_rows(path: Path) -> Any:
+    """What `write_rows` wrote, as an xarray.Dataset over `run`, or over what varied if that is one axis.
+
+    Raises SimulationError for a file that is none of a sweep's.
+    """
+    import pandas as pd
+    import xarray as xr
+
+    try:
+        if path.suffix == ".csv":
+            rows = pd.read_csv(path, keep_default_na=False, na_values=["nan", ""])
+            about = json.loads(path.with_name(path.name + METADATA).read_text(encoding="utf-8"))
+            facts = about["notes"][0]
+            units = {
+                c["titles"]: c.get("schema:unitText", "") for c in about["tableSchema"]["columns"]
+            }
+        else:
+            import pyarrow.parquet as pq
+
+            table = pq.read_table(path)
+            facts = json.loads(table.schema.metadata[b"lagfmu"])
+            units = {f.name: f.metadata[b"unit"].decode() for f in table.schema}
+            rows = table.to_pandas()
+        names = [n for n in rows.columns if n not in ("run", "status", "reason", "reached")]
+        causes = [n for n in names if ":" not in n]
+        dim = causes[0] if len(causes) == 1 and rows[causes[0]].is_monotonic_increasing else "run"
+        made = xr.Dataset(
+            {n: (dim, rows[n].to_numpy()) for n in (*names, "reached") if n not in causes},
+            {
+                n: (dim, rows[n].to_numpy(float))
+                for n in (*causes, "run")
+                if n == dim or n in causes
+            },
+            dict(facts),
+        )
+        for n in ("status", "reason"):
+            made[n] = (dim, rows[n].fillna("").to_numpy(object))
+        for n in made.variables:
+            made[n].attrs["units"] = units.get(str(n), "")
+    except (OSError, ValueError, KeyError, TypeError, IndexError) as error:
+        raise SimulationError(
+            f"{str(path)!r} is no table that lagfmu sweep wrote ({error}): expected its .parquet file, or "
+            f"its .csv file with {path.name}{METADATA} beside it"
+        ) from None
+    return made

@@ -1,0 +1,1 @@
+"""What an FMU does, as one file to hand on."""

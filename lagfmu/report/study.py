@@ -1,0 +1,50 @@
+"""The table of a sweep as part of a report: what varied, what was kept, a figure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from markupsafe import Markup
+
+from ..study.sweep.plot import figure_of
+from ..study.sweep.table import happened, numbers, one_by_one, read_rows, varied
+from ..verification.result import as_text
+from .figures import svg
+
+
+@dataclass(frozen=True)
+class Study:
+    """`rows`: name, smallest, median and largest value, unit; `facts`: how it was made."""
+
+    name: str
+    runs: int
+    refused: int
+    rows: list[tuple[str, ...]]
+    facts: list[tuple[str, str]]
+    figure: Markup
+
+
+def study_in(path: Path) -> Study:
+    """Of a .parquet or .csv file that `sweep` wrote.  Raises SimulationError for another."""
+    found = read_rows(path)
+    runs = one_by_one(found)
+    status = runs["status"].values
+    rows = []
+    for n in (*varied(runs), *numbers(found)):
+        values = np.asarray(runs[n].values if n in runs.coords else happened(runs, n), dtype=float)
+        values = values[np.isfinite(values)]
+        cells = (values.min(), np.median(values), values.max()) if len(values) else ()
+        rows.append(
+            (n, *([as_text(x) for x in cells] or ["never"] * 3), runs[n].attrs.get("units", ""))
+        )
+    facts = [(k.replace("_", " "), str(v)) for k, v in found.attrs.items() if v]
+    return Study(
+        Path(found.attrs.get("fmu", path.name)).stem,
+        len(status),
+        int((status != "ok").sum()),
+        rows,
+        facts,
+        svg(figure_of(found), "The study"),
+    )
