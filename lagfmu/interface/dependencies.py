@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Collection, Iterable
 from functools import cached_property
 
@@ -12,6 +13,8 @@ from ..mechanics.coupling import coupled
 from ..mechanics.equations import TIME, EquationsOfMotion
 from ..mechanics.form import Form
 from ..model.elements import Expr
+
+Names = frozenset[str]
 
 
 class Dependencies:
@@ -35,55 +38,77 @@ class Dependencies:
         starts = eom.starts()
         self.given = starts.keys() - {str(eom.symbols[s]) for s in eom.model.rough}
         self.starts = {name: starts.get(name, sp.S.Zero) for name in self.states}
+        self._order = {
+            name: k
+            for k, name in enumerate(
+                [*(s.name for s in eom.p), *self.inputs, *self.states, names.TIME]
+            )
+        }
+        self._sorted_at_points: dict[Names, tuple[str, ...]] = {}
+        self._sorted_at_start: dict[Names, tuple[str, ...]] = {}
 
-    def symbols(self, *expressions: Expr) -> set[str]:
+    def symbols(self, *expressions: Expr) -> Names:
         """Names of the symbols that the expressions hold, reduced coordinates put in; of the time, `time`."""
-        found: set[str] = set()
+        held: set[Expr] = set()
         for e in expressions:
             if e is not None:
-                held = sp.sympify(e).xreplace(self.into).free_symbols
-                found |= {names.TIME if s == TIME else str(s) for s in held}
-        return found
+                held |= (sp.sympify(e).xreplace(self.into) if self.into else e).free_symbols
+        return frozenset(names.TIME if s == TIME else s.name for s in held)
 
-    def rates(self, k: int) -> set[str]:
+    def rates(self, k: int) -> Names:
         """The symbols behind G v - nu of a row."""
-        own = {j: a for (i, j), a in self.eom.G.todok().items() if i == k}
+        own = self._rows[k]
         return self.symbols(*own.values(), self.eom.nu[k], *(self.eom.v[j] for j in own))
 
-    def group(self, *, speed: int | None = None, row: int | None = None) -> set[str]:
+    @cached_property
+    def _rows(self) -> dict[int, dict[int, Expr]]:
+        found: dict[int, dict[int, Expr]] = defaultdict(dict)
+        for (k, j), a in self.eom.G.todok().items():
+            found[k][j] = a
+        return found
+
+    def group(self, *, speed: int | None = None, row: int | None = None) -> Names:
         """Symbols behind the accelerations and multipliers that are solved together."""
-        for speeds, rows, symbols in self.groups:
-            if speed in speeds or (row is not None and row in rows):
-                return symbols
-        raise KeyError((speed, row))
+        of_speeds, of_rows = self._groups_of
+        return of_rows[row] if speed is None and row is not None else of_speeds[speed]
 
     @cached_property
-    def groups(self) -> list[tuple[frozenset[int], frozenset[int], set[str]]]:
+    def _groups_of(self) -> tuple[dict[int | None, Names], dict[int, Names]]:
+        groups = self.groups
+        return (
+            {i: symbols for speeds, _, symbols in groups for i in speeds},
+            {k: symbols for _, rows, symbols in groups for k in rows},
+        )
+
+    @cached_property
+    def groups(self) -> list[tuple[frozenset[int], frozenset[int], Names]]:
         """The groups of `coupled`, with the symbols in their equations."""
         eom, found = self.eom, []
+        masses = eom.M.todok().items()
         for speeds, rows in coupled(eom):
-            M = [m for (i, _), m in eom.M.todok().items() if i in speeds]
-            G = [a for (k, _), a in eom.G.todok().items() if k in rows]
+            M = [m for (i, _), m in masses if i in speeds]
+            G = [a for k in rows for a in self._rows[k].values()]
             rest = [eom.F[i] for i in speeds] + [eom.gamma[k] for k in rows]
             found.append((speeds, rows, self.symbols(*M, *G, *rest)))
         return found
 
     @cached_property
-    def of_stepped(self) -> set[str]:
+    def of_stepped(self) -> Names:
         """Symbols behind the accelerations of the stepped coordinates of a reduction."""
         eom = self.stepped
         return self.symbols(*eom.M.todok().values(), *eom.F, *eom.G.todok().values(), *eom.gamma)
 
     @cached_property
-    def _stepped_groups(self) -> list[tuple[set[str], set[str]]]:
-        """Of the coordinates that are stepped: the states of each group, the symbols of its start."""
-        eom, found = self.stepped, []
+    def _behind_start(self) -> dict[str, Names]:
+        """Of each state that the projection can move: the symbols of the start of its group."""
+        found: dict[str, Names] = {}
+        eom = self.stepped
         for speeds, rows in coupled(eom):
-            own = _moved(eom, speeds) | {str(eom.v[i]) for i in speeds}
+            own = _moved(eom, speeds) | {eom.v[i].name for i in speeds}
             behind = self.symbols(*(eom.f[k] for k in rows), *(eom.nu[k] for k in rows))
             behind |= self.symbols(*(a for (k, _), a in eom.G.todok().items() if k in rows))
             behind |= self.symbols(*(m for (i, _), m in eom.M.todok().items() if i in speeds))
-            found.append((own, own | behind))
+            found |= dict.fromkeys(own & self.movable, behind | own)
         return found
 
     @cached_property
@@ -102,23 +127,45 @@ class Dependencies:
 
     def at_points(self, symbols: Iterable[str]) -> tuple[str, ...]:
         """Inputs, states and the time behind a value at a communication point."""
-        return self._sorted((self.known | {names.TIME}).intersection(symbols))
+        asked = frozenset(symbols)
+        if asked not in self._sorted_at_points:
+            known = {n for n in asked if n in self.known or n == names.TIME}
+            self._sorted_at_points[asked] = self._sorted(known)
+        return self._sorted_at_points[asked]
 
     def at_start(self, symbols: Iterable[str]) -> tuple[str, ...]:
         """Inputs, parameters, exact start values and the time behind a value at the start."""
-        found = set(symbols)
-        for own, behind in self._stepped_groups:
-            if found & own & self.movable:
-                found |= behind
-        parameters = {str(p) for p in self.eom.p}
-        formulas = {name for name, e in self.starts.items() if e.free_symbols}
-        found |= self.symbols(*(self.starts[name] for name in found & formulas))
-        exact = set(self.states) - self.movable - formulas
-        return self._sorted(found & (parameters | exact | {*self.inputs, names.TIME}))
+        asked = frozenset(symbols)
+        if asked not in self._sorted_at_start:
+            groups = {self._behind_start[n] for n in asked if n in self._behind_start}
+            found = one_of(asked, groups)
+            if found != asked:
+                self._sorted_at_start[asked] = self.at_start(found)
+            else:
+                found |= self.symbols(*(self._formulas[n] for n in found if n in self._formulas))
+                self._sorted_at_start[asked] = self._sorted(found & self._settable)
+        return self._sorted_at_start[asked]
 
-    def _sorted(self, found: set[str]) -> tuple[str, ...]:
-        order = [*(str(p) for p in self.eom.p), *self.inputs, *self.states, names.TIME]
-        return tuple(n for n in order if n in found)
+    @cached_property
+    def _formulas(self) -> dict[str, Expr]:
+        return {name: e for name, e in self.starts.items() if e.free_symbols}
+
+    @cached_property
+    def _settable(self) -> Names:
+        """Parameters, exact start values, inputs and the time."""
+        exact = set(self.states) - self.movable - self._formulas.keys()
+        return frozenset({*(s.name for s in self.eom.p), *exact, *self.inputs, names.TIME})
+
+    def _sorted(self, found: Collection[str]) -> tuple[str, ...]:
+        return tuple(sorted((n for n in found if n in self._order), key=self._order.__getitem__))
+
+
+def one_of(found: Names, groups: Collection[Names]) -> Names:
+    """What is found with these groups; one of them itself if it holds all the others."""
+    largest = max(groups, key=len, default=found)
+    if all(part <= largest for part in (found, *groups)):
+        return largest
+    return found.union(*groups)
 
 
 def _moved(eom: EquationsOfMotion, speeds: Collection[int]) -> set[str]:

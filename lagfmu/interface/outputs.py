@@ -6,7 +6,9 @@ Each knows what it depends on (dependencies.py).
 from __future__ import annotations
 
 import dataclasses
+from collections import defaultdict
 from collections.abc import Iterable
+from functools import cached_property
 
 import sympy as sp
 
@@ -27,7 +29,7 @@ from ..model.units import (
     parse_unit,
 )
 from ..names import Subject
-from .dependencies import Dependencies
+from .dependencies import Dependencies, Names, one_of
 from .variables import Variable
 
 BARRED = (  # what has an error bar, besides coordinates, velocities and outputs of one word
@@ -70,7 +72,7 @@ class Outputs:
         discrete: bool = False,
     ) -> Variable:
         """One of them; `symbols`: the names of those behind its value."""
-        symbols = set(symbols)
+        symbols = frozenset(symbols)
         return Variable(
             of=of,
             kind=kind,
@@ -101,7 +103,7 @@ class Outputs:
                 variables += self._of_coordinate(q, v, of_stepped)
         return sorted(variables, key=self._place) if eom.bare else variables
 
-    def _of_coordinate(self, q: Expr, v: Expr, symbols: set[str]) -> list[Variable]:
+    def _of_coordinate(self, q: Expr, v: Expr, symbols: Names) -> list[Variable]:
         """Itself, its velocity, and its acceleration, behind which are these `symbols`."""
         name = str(q)
         text = self._text(name, "coordinate")
@@ -114,8 +116,11 @@ class Outputs:
         ]
 
     def _text(self, name: str, kind: str) -> str:
-        texts = {name_of(s): text for s, text in self.model.descriptions.items()}
-        return texts.get(name, f"{kind} {name}")
+        return self._texts.get(name, f"{kind} {name}")
+
+    @cached_property
+    def _texts(self) -> dict[str, str]:
+        return {name_of(s): text for s, text in self.model.descriptions.items()}
 
     def _places_and_speeds(self) -> list[Variable]:
         """Coordinates with their rates, then speeds with theirs; a rate that is a speed is told there."""
@@ -191,11 +196,14 @@ class Outputs:
             text = f"true where {of.name} is determined uniquely"
             of = Subject(names.UNIQUE, c.name)
             variables.append(self.output(of, text, None, entries, "Boolean"))
+        of_column: dict[int, list[int]] = defaultdict(list)
+        for k, j in sorted(jacobian):
+            of_column[j].append(k)
         pairs = zip(self.eom.directions, self.eom.v, strict=True)
         for j, (q, v) in enumerate(() if self.eom.bare else pairs):
             unit = generalized_force_unit(self.units[str(v)] * SECOND)
-            touching = [k for k in range(self.eom.m) if (k, j) in jacobian]
-            symbols = self.behind.group(speed=j) if touching else set()
+            touching = of_column[j]
+            symbols = self.behind.group(speed=j) if touching else frozenset()
             text = f"generalized force of all constraints on {q}"
             variables.append(self.output(Subject(names.FORCE, "", q), text, unit, symbols))
             for k in touching:
@@ -219,16 +227,14 @@ class Outputs:
 
     def own(self) -> list[Variable]:
         """The model's own: their dependencies are those of all that stands in them."""
-        variables = []
+        variables, behind = [], self.behind
+        solved = {s: behind.group(speed=j) for j, s in enumerate(self.eom.vdot)}
+        solved |= {s: behind.group(speed=j) for j, s in enumerate(self.eom.Q)}
+        solved |= {s: behind.group(row=k) for k, s in enumerate(self.eom.lam)}
         for o in self.eom.outputs:
             found = symbols_of(o)
-            symbols = self.behind.symbols(*found)
-            for j, (a, force) in enumerate(zip(self.eom.vdot, self.eom.Q, strict=True)):
-                if found & {a, force}:
-                    symbols |= self.behind.group(speed=j)
-            for k, lam in enumerate(self.eom.lam):
-                if lam in found:
-                    symbols |= self.behind.group(row=k)
+            own = behind.symbols(*(found - solved.keys()))
+            symbols = one_of(own, {solved[s] for s in found & solved.keys()})
             text = o.description or f"output {o.name}"
             unit = parse_unit(o.unit, o.name)
             variables.append(self.output(Subject(names.OWN, "", o.name), text, unit, symbols))
@@ -272,7 +278,7 @@ class Outputs:
             _, force, speed = self._units_of(self.eom.constraints[row[law.of[0]]])
             what = f"friction {law.name}" + (f": {law.description}" if law.description else "")
             behind = self.behind.group(row=row[law.of[0]]) | self.behind.symbols(*law.expressions)
-            behind = self.behind.known | behind
+            behind |= self.behind.known
             text = f"true while {what} sticks (and its normal contact is closed)"
             of = Subject(names.STICKS, law.name)
             variables.append(self.output(of, text, None, behind, "Boolean"))

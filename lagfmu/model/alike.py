@@ -48,6 +48,7 @@ def pattern(
     places: dict[Expr, Place] = {}
     spots: dict[tuple[Expr, ...], list[tuple[str, ...]]] = {}
     closed: dict[ClosedFunction, None] = {}
+    made: dict[Expr, Expr] = {}
     for k, value in enumerate(values):
         stack, seen = [value], set[Expr]()
         while stack:
@@ -72,13 +73,13 @@ def pattern(
     vectors = sorted(spots, key=lambda e: (places.get(e[0], ("", 0)), sorted(spots[e])))
     inputs = (*ordered, *(x for e in vectors for x in e[4:]))
     symbols = sp.symbols(f"a:{len(inputs)}", real=True)
-    table = dict(zip(ordered, symbols, strict=False))
+    table: dict[Expr, Expr] = dict(zip(ordered, symbols, strict=False))
     vector_of = {e: symbols[len(ordered) + 3 * k :][:3] for k, e in enumerate(vectors)}
-    made = {}
     for e in closed:
-        args = [a.xreplace(table) for a in e.args]
+        args = [table[a] if a in table else a.xreplace(table) if a.args else a for a in e.args]
         if e.args[2:9] in vector_of:
             args[6:9] = vector_of[e.args[2:9]]
         made[e] = e.func(*args)
+    table |= made
     groups = (*(places[s][0] for s in ordered), *("" for _ in range(3 * len(vectors))))
-    return Pattern(tuple(v.xreplace(table | made) for v in values), symbols, groups, inputs)
+    return Pattern(tuple(v.xreplace(table) for v in values), symbols, groups, inputs)
