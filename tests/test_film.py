@@ -14,7 +14,7 @@ from PIL import Image
 from typer.testing import CliRunner
 
 from lagfmu import simulate
-from lagfmu.testing import Prepared, app, film, moving, told_by
+from lagfmu.testing import Prepared, app, film, moving, solids, told_by
 
 Fmu = Callable[[str], Path]
 
@@ -78,6 +78,36 @@ def test_a_film_is_cut_to_the_motion_and_tells_the_value_of_each_arrow(
     rows, columns = np.array(dots).T
     assert (np.diff(columns) > 0).all()
     assert rows[-1] > rows[0] + 60
+
+
+def volume(facets: list[Any], frame: int) -> float:
+    """A third of the flux of r out of the facets: positive where all of them look outward."""
+    fans = [f[frame][[0, k, k + 1]] for f in facets for k in range(1, f.shape[1] - 1)]
+    return float(np.linalg.det(np.array(fans)).sum() / 6)
+
+
+def test_facets_enclose_their_solid() -> None:
+    """By Gauss: a b c of a box, of a cylinder and a ball that of polygons in place of circles; of a box three
+    facets are seen, and the upper one is the lightest."""
+    center = np.array([[0.0, 0, 0], [1, -2, 3]])
+    turned = [np.array([[0.36, 0.48, -0.8]] * 2), np.array([[-0.8, 0.6, 0]] * 2)]
+    turned.append(np.cross(*turned))
+    box = solids.box(center, np.array([[2.0, 3, 5]] * 2), turned)
+    assert [volume(box, k) for k in (0, 1)] == pytest.approx([30, 30])
+    n = solids.ROUND
+    way = np.array([0.3, 0.4, 1.2])
+    rod = solids.cylinder(center, center + way, np.array([0.5, 0.1]))
+    polygon = n / 2 * np.sin(2 * np.pi / n)
+    expected = [1.3 * polygon * 0.25, 1.3 * polygon * 0.01]
+    assert [volume(rod, k) for k in (0, 1)] == pytest.approx(expected)
+    assert volume(solids.ball(center, np.array([2.0, 1.0])), 0) == pytest.approx(
+        32 * np.pi / 3, rel=0.05
+    )
+    upright = solids.box(center, np.ones((2, 3)), [np.array([e] * 2, float) for e in np.eye(3)])
+    shades = [solids.shade(f[0], moving.TOWARDS) for f in upright]
+    seen = [light for light in shades if light is not None]
+    assert len(seen) == 3
+    assert max(seen) == shades[4]  # facing z
 
 
 def test_a_film_without_a_title_is_a_thumbnail(

@@ -91,6 +91,7 @@ class Draft:
         self.placed: dict[Marker, Placed] = {}
         self.curves: dict[Expr, Curve] = {}  # by the coordinate K.curve.s
         self.readings: dict[str, Placed] = {}  # markers that are read on request, by name
+        self.gravity: dict[str, Vector] = {}
 
     # ------------------------------------------------------------------ numbers
 

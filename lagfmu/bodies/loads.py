@@ -29,6 +29,7 @@ class Gravity:
     def add(self, draft: Draft) -> None:
         """V = -m g . r of each body."""
         g = draft.vector(self.acceleration, self.name, "m/s^2", "acceleration of gravity")
+        draft.gravity[self.name] = g
         for body, motion in draft.motions.items():
             if isinstance(body, Body):
                 weight = times(-1, times(motion.mass, g))

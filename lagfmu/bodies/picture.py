@@ -169,11 +169,7 @@ def _carried(draft: Draft, motion: Motion, shape: Any) -> Shape:
 def _of_part(draft: Draft, part: Any) -> Iterator[Shape]:
     """A joint, a rod without mass, a spring, the direction of gravity, in space."""
     if isinstance(part, Gravity):
-        g = [
-            draft.number(x, f"{part.name}.{k}", "m/s^2")
-            for k, x in zip(AXES, part.acceleration, strict=True)
-        ]
-        yield Direction(part.name, tuple(g))
+        yield Direction(part.name, _drawn(draft, draft.gravity[part.name]))
     if not isinstance(part, Joint | Distance | SpringDamper):
         return
     first, second = draft.placed[part.first], draft.placed[part.second]

@@ -1,8 +1,8 @@
 """Boxes, cylinders and balls of a film as flat facets: which of them are seen, and how light they are.
 
 A facet is an array (frames, corners, 3) [m], counterclockwise from outside.  Each solid is convex, so that of
-its own facets those that look at the reader do not cover each other; solids are drawn from the farthest to
-the nearest.
+its own facets those that look at the reader do not cover each other; films draw what stands still, then what
+moves from the farthest to the nearest.
 """
 
 from __future__ import annotations
