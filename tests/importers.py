@@ -18,6 +18,7 @@ import pytest
 from engines import EngineError
 from fmpy import read_model_description
 
+TYPES = {"Float64": "Real", "Int32": "Integer"}  # of FMI 3.0
 Values = Mapping[str, Mapping[str, Any]]  # instance -> variable -> value
 
 
@@ -80,5 +81,8 @@ def _described(path: Path) -> dict[str, Any]:
         "path": str(path),
         "guid": description.guid,
         "identifier": description.coSimulation.modelIdentifier,
-        "variables": {v.name: (v.valueReference, v.type) for v in description.modelVariables},
+        "variables": {
+            v.name: (v.valueReference, TYPES.get(v.type, v.type))
+            for v in description.modelVariables
+        },
     }

@@ -1,0 +1,109 @@
+"""FMUs of FMI 3.0 in importers that are not ours: the event, seen from outside."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import fmpy
+import importers
+import mpmath
+import numpy as np
+import pytest
+from conftest import Fmu
+
+from lagfmu.testing import Face, Prepared, write
+
+G, THETA = 9.81, 0.01  # m/s^2, rad: of the hemisphere, a = 1 m
+TIGHT = 1e-12
+
+
+def departure() -> float:
+    """When the particle leaves [s]: cos theta = (2/3) cos theta0 in
+    t = sqrt(a/g) int du / sqrt(1 - k^2 cosh^2 u), k = sin(theta0/2), k cosh u = sin(theta/2)."""
+    theta, k = mpmath.mpf(THETA), mpmath.sin(mpmath.mpf(THETA) / 2)
+    last = mpmath.acosh(mpmath.sin(mpmath.acos(2 * mpmath.cos(theta) / 3) / 2) / k)
+    area = mpmath.quad(
+        lambda u: 1 / mpmath.sqrt(1 - (k * mpmath.cosh(u)) ** 2), [0, last / 2, last]
+    )
+    return float(area / mpmath.sqrt(mpmath.mpf(G)))
+
+
+def test_fmpy_stops_at_the_departure(fmi3_fmu: Fmu) -> None:
+    """With a communication step of 0.1 s there is a point at the departure: lambda = 0, and free flight from
+    there."""
+    run = fmpy.simulate_fmu(
+        str(fmi3_fmu("Hemisphere")),
+        fmi_type="CoSimulation",
+        use_event_mode=True,
+        early_return_allowed=True,
+        output_interval=0.1,
+        relative_tolerance=TIGHT,
+    )
+    off = run["time"] / 0.1 % 1.0
+    (at,) = set(run["time"][np.minimum(off, 1 - off) > 1e-6])
+    assert abs(at - departure()) < 1e-12 * at
+    before, after = run[run["time"] == at]  # it is read before the event and after it
+    assert bool(before["contact.surface"])
+    assert not after["contact.surface"]
+    assert before["lambda.surface"] == after["lambda.surface"] == 0.0
+    flight = run[run["time"] >= at][1:]
+    x = flight["r"] * np.sin(flight["theta"])
+    speed = after["der(theta)"] * after["r"] * np.cos(after["theta"])
+    assert np.abs(x - x[0] - speed * (flight["time"] - at)).max() < 1e-10
+    assert len(flight) > 3
+
+
+def test_a_clock_ticks_at_the_departure(
+    prepared: Callable[[str], Prepared], tmp_path: Path
+) -> None:
+    """fmuloader drives the clock: in event mode at the departure it is active once, and the contact is closed
+    before and open after."""
+    fmi3 = pytest.importorskip("fmuloader.fmi3")
+    face = Face(3, clocks=True)
+    path = write(prepared("Hemisphere"), tmp_path, target="native", face=face)
+    description = fmpy.read_model_description(str(path))
+    of = {v.name: v.valueReference for v in description.modelVariables}
+    slave = fmi3.Fmi3Slave(path, model_identifier="Hemisphere")
+    slave.instantiate_co_simulation(
+        "hemisphere",
+        instantiation_token=description.guid,
+        event_mode_used=True,
+        early_return_allowed=True,
+    )
+    slave.enter_initialization_mode(start_time=0.0, tolerance=TIGHT)
+    slave.exit_initialization_mode()
+
+    def go_on() -> None:
+        while slave.update_discrete_states().discrete_states_need_update:
+            pass
+        slave.enter_step_mode()
+
+    go_on()
+    time, ticks = 0.0, []
+    while time < 2.0 - 1e-9:
+        step = slave.do_step(time, min(0.1, 2.0 - time))
+        time = step.last_successful_time
+        if step.event_handling_needed:
+            closed = slave.get_boolean([of["contact.surface"]])
+            slave.enter_event_mode()
+            active = slave.get_clock([of["clock.surface"]])
+            go_on()
+            ticks.append((time, closed, active, slave.get_boolean([of["contact.surface"]])))
+    slave.terminate()
+    slave.free_instance()
+    ((at, closed, active, still),) = ticks
+    assert abs(at - departure()) < 1e-12 * at
+    assert (closed, active, still) == ([True], [True], [False])
+
+
+def test_ecos_gives_the_numbers_of_fmi_2(native_fmu: Fmu, fmi3_fmu: Fmu) -> None:
+    """A C++ engine that imports both: the same values at the same points."""
+    read = [("h", n) for n in ("theta", "lambda.surface", "departure.surface.time")]
+    found = [
+        importers.run("ecos", {"h": fmu("Hemisphere")}, read, 0.01, 200, {"h": {"theta": 0.3}})
+        for fmu in (native_fmu, fmi3_fmu)
+    ]
+    for n in read:
+        assert found[0][n].tobytes() == found[1][n].tobytes()
+    assert found[0][read[2]][-1] > 0.4
