@@ -601,6 +601,66 @@ pin = Revolute("A", ground.at((0, 0)), arm.at((0, 0)))
             },
             "its curve has 1 components, expected 2",
         ),
+        (
+            {"joints": [Revolute("A", ground.at((0, 0)), arm.at((0, 0)), axis=2)]},
+            "Revolute 'A': axis is 2, expected 'z' in the plane xy",
+        ),
+        (
+            {"joints": [Prismatic("D", ground.at((0, 0)), arm.at((0, 0)), friction=(1, 2, 3))]},
+            "friction is (1, 2, 3), expected one coefficient, or the static and the kinetic",
+        ),
+        (
+            {"joints": [Revolute("A", ground.at((0, 0)), arm.at((0, 0)), restitution=0.5)]},
+            "restitution is given, but no limits at which it could rebound",
+        ),
+        (
+            {"contacts": [Contact("K", ground.at((0, 0)), arm.at((0, 0)), radius=-0.1)]},
+            "Contact 'K': radius is -0.1, expected a number of at least 0 in m",
+        ),
+        (
+            {"contacts": [Contact("K", ground.at((0, 0)), arm.at((0, 0)), restitution=2)]},
+            "Contact 'K': restitution is 2, expected a number from 0 to 1",
+        ),
+        (
+            {"joints": [Distance("L", ground.at((0, 0)), arm.at((0, 0)), -1)]},
+            "L.length is -1, expected a positive number in m",
+        ),
+        ({"joints": [pin, Gear("G", "A", None, 2.0)]}, "Gear 'G' names the joint None"),
+        (
+            {"joints": [pin], "loads": [Motor("motor", "A", torque=1, motion=True)]},
+            "torque and motion are given, expected one of them",
+        ),
+        (
+            {"loads": [Force("push", ground.at((0, 0)), (1, 0))]},
+            "Force 'push' acts on the ground, which does not move",
+        ),
+        ({"bodies": arm}, "bodies is Body("),
+        ({"start": [1.0]}, "start is [1.0], expected a dict by names: start={'angle.A': ...}"),
+        (
+            {"bodies": [Body("b", Parameter("m", 1.0, "kg"), 0.1)]},
+            "b.mass: parameter 'm' is no SymPy symbol",
+        ),
+        (
+            {
+                "joints": [
+                    PointOnCurve("K", ground.at((0, 0)), arm.at((0, 0)), Track((1, 2), turn, 0, 1))
+                ]
+            },
+            "its points (1, 2) do not depend on turn, expected expressions of a symbol",
+        ),
+        (
+            {
+                "joints": [
+                    PointOnCurve(
+                        "K",
+                        ground.at((0, 0)),
+                        arm.at((0, 0)),
+                        Track((turn, sympy.log(-1 - turn**2)), turn, 0, 1),
+                    )
+                ]
+            },
+            "joint 'K' has no finite value where it begins: start it elsewhere",
+        ),
         ({"read": {"tip": pin}}, "Reading 'tip': at is Revolute("),
         ({"read": {"tip": ground.at((0, 0))}}, "'tip': its marker is on the ground"),
         ({"read": {"arm": arm}}, "'arm' is used twice, by a Body and a Reading"),
@@ -665,6 +725,21 @@ def test_a_rough_slide_holds_a_block_up_to_the_angle_of_friction():
     expected = g * (sin(alpha) - 0.4 * cos(alpha))
     assert slides["der(position.D,2)"][1:] == pytest.approx(expected, rel=1e-11)
     assert slides["force.D.x"][1:] == pytest.approx(-0.4 * 2 * g * cos(alpha), rel=1e-11)
+
+
+def test_a_limit_gives_back_the_part_of_the_speed_that_its_restitution_says():
+    """A hinge without forces turns at 2 rad/s between stops at 0 and 1 rad with e = 0.5: it strikes at 0.5 s,
+    1.5 s and 3.5 s, each time with half the speed, and loses 3/4 of its energy."""
+    door = Body("door", 2.0, 0.05)
+    hinge = Revolute("A", ground.at((0, 0)), door.at((0, 0)), limits=(0, 1), restitution=0.5)
+    run = moved(
+        plane(bodies=[door], joints=[hinge], start={"der(angle.A)": 2.0}), 4.0, target="native"
+    )
+    assert run["closing.A.upper.count"][-1] == 2
+    assert run["closing.A.lower.time"][-1] == pytest.approx(1.5, rel=1e-9)
+    assert run["closing.A.upper.time"][-1] == pytest.approx(3.5, rel=1e-9)
+    assert run["der(angle.A)"][-1] == pytest.approx(-0.25, rel=1e-9)
+    assert run["energy.dissipated"][-1] == pytest.approx(0.05 / 2 * (4 - 1 / 16), rel=1e-9)
 
 
 def test_a_mechanism_of_the_plane_is_not_told_to_take_one():

@@ -343,6 +343,19 @@ arm = Body("arm", 1.0, (0.1, 0.1, 0.1))
             },
             "Cylindrical 'A' has no angle or position or both, expected one of angle.A, position.A",
         ),
+        (
+            {"joints": [Universal("U", ground.at((0, 0, 0)), arm.at((0, 0, 0)), second_axis="x")]},
+            "the axes of universal joint 'U' begin 0 degrees from parallel, expected square",
+        ),
+        (
+            {
+                "joints": [
+                    Fixed("F", ground.at((0, 0, 0)), arm.at((0, 0, 0), ("rpy", 0, 0, pi / 6))),
+                    Universal("U", ground.at((0, 0, 0)), arm.at((0, 0, 0))),
+                ]
+            },
+            "universal joint 'U' cannot be closed: at the nearest that was found its axes miss being square",
+        ),
         ({"start": {"arm.rpy": 0.3}}, "start of 'arm.rpy' is 0.3, expected three numbers: roll"),
         (
             {"start": {"arm.rpy": (0, 0, 1), "arm.orientation.w": 1.0}},

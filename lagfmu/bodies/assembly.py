@@ -10,6 +10,7 @@ each that does is told with both numbers.
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
@@ -25,11 +26,13 @@ from .branches import CLOSED, has_loop, tell_second_branch
 from .draft import Draft
 from .given import Beginning, given_values, known_names
 from .guess import guessed
+from .joints import CROSS
 from .rows import TIME, Array, Rows, condition, numbers_of
 
 STEPS, HALVINGS = 100, 12
 TRIES = 12  # beginnings with other omitted values, where the first leads nowhere
 LIGHT = 1e-6  # what resists a parameter of a curve, which has no mass, of that of the body
+PARALLEL = 0.99  # cosine of the axes of a universal joint
 REDUNDANT = 1e-11  # a singular value, relative to the largest: rows that say the same
 EPS = float(np.finfo(float).eps)
 
@@ -38,6 +41,7 @@ class GivenStartWarning(LagfmuWarning):
     """A start value that was given, and cannot be."""
 
 
+@np.errstate(all="ignore")  # what is not finite is told
 def assemble(
     draft: Draft, model: Model, parts: Sequence[Any], start: Mapping[str, Any]
 ) -> tuple[dict[Expr, float], list[Expr]]:
@@ -61,6 +65,8 @@ def assemble(
     wanted = np.concatenate([np.zeros(len(closing)), np.array([*places.values()])])
     moving = _Moving(draft, model)
     rough = moving.tied(guessed(draft, model, parts, places), places)
+    if problems := list(_parallel([c.name for c in closing], f.values(rough))):
+        raise ModelError(model.name, problems)
     size = moving.sized(rough)
     q, missed = moving.closed([f, held], wanted, rough)
     if missed.max(initial=0.0) > CLOSED:
@@ -172,6 +178,8 @@ class _Moving:
     def newton(self, rows: Sequence[Rows], wanted: Array, q: Array) -> tuple[Array, Array]:
         """Coordinates near q at which the rows have the wanted values, and what each misses."""
         r, A, size = self._missed(rows, wanted, q)
+        if not (np.isfinite(r).all() and np.isfinite(A).all()):
+            return q, np.full(len(r), np.inf)
         for _ in range(STEPS):
             step = self._least(A / size[:, None], r / size)
             for halved in range(HALVINGS):
@@ -207,14 +215,36 @@ class _Moving:
         return v + self._least(A / size[:, None], missing / size)
 
 
+def _parallel(names: Sequence[str], values: Array) -> Iterator[str]:
+    """Universal joints whose axes are parallel where they begin: which way they turn apart nobody says."""
+    for name, cosine in zip(names, values.tolist(), strict=True):
+        joint, _, row = name.partition(".")
+        if row == CROSS and abs(cosine) > PARALLEL:
+            apart = math.degrees(math.acos(min(abs(cosine), 1.0)))
+            yield (
+                f"the axes of universal joint {joint!r} begin {apart:.3g} degrees from parallel, expected "
+                "square: choose other axes (axis=, second_axis=), turn a marker, or give a body another "
+                "start, as its rpy"
+            )
+
+
 def _open(names: Sequence[str], values: Array, missed: Array) -> Iterator[str]:
     """Which joints miss, the worst first."""
     worst: dict[str, tuple[float, float]] = {}
+    by_name = dict(zip(names, values.tolist(), strict=True))
     for name, value, miss in zip(names, values.tolist(), missed.tolist(), strict=True):
         joint = name.split(".")[0]
         worst[joint] = max(worst.get(joint, (0.0, 0.0)), (miss, abs(value)))
     for joint, (miss, value) in sorted(worst.items(), key=lambda item: -item[1][0]):
-        if miss > CLOSED:
+        if not math.isfinite(value):
+            yield f"joint {joint!r} has no finite value where it begins: start it elsewhere"
+        elif f"{joint}.{CROSS}" in by_name and miss > CLOSED:
+            off = math.degrees(math.asin(min(abs(by_name[f"{joint}.{CROSS}"]), 1.0)))
+            yield (
+                f"universal joint {joint!r} cannot be closed: at the nearest that was found its axes miss "
+                f"being square by {off:.3g} degrees: turn a marker, or choose other axes"
+            )
+        elif miss > CLOSED:
             yield (
                 f"joint {joint!r} cannot be closed: the nearest that was found misses it by {value:.3g} "
                 "(m or rad): correct a length, or give a start nearer to where it closes"

@@ -2,29 +2,42 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from ..model.elements import NAME, Parameter, is_number
-from ..model.picture import Box, Track, points_of
-from ..model.spline import Spline
+from ..model.elements import NAME, is_number
+from ..model.picture import Box, points_of
 from ..names import RESERVED
 from .body import Body, Ground, Marker
+from .check_ties import kind_of, problems_of_ties, value_of
 from .contacts import Contact
 from .curves import PointOnCurve
-from .joints import Distance, Gear, Joint, Rolling, Universal, name_of_joint
+from .joints import Distance, Gear, Joint, Rolling
 from .loads import Force, Gravity, Motor, SpringDamper, Torque, Torsion
 from .picture import CARRIED, shapes_of
 from .readings import Reading
 from .rotation import problem_of
 from .space import PAIRS
-from .vectors import AXES
 
 PARTS = (Joint, Distance, PointOnCurve, Rolling, Gear, Contact)
 PARTS += (Gravity, SpringDamper, Torsion, Force, Torque, Motor)  # type: ignore[assignment]
 PLANES = (None, "xy")
+
+
+def problems_of_containers(lists: Mapping[str, object], dicts: Mapping[str, object]) -> list[str]:
+    """What is no list, or no dict by names."""
+    problems = [
+        f"{name} is {value!r}, expected a list: {name}=[...]"
+        for name, value in lists.items()
+        if isinstance(value, str) or not isinstance(value, Sequence)
+    ]
+    return problems + [
+        f"{name} is {value!r}, expected a dict by names: {name}={{'{example}': ...}}"
+        for (name, value), example in zip(dicts.items(), ("angle.A", "tip"), strict=True)
+        if not isinstance(value, Mapping) or not all(isinstance(key, str) for key in value)
+    ]
 
 
 def problems_of(plane: object, bodies: Sequence[Any], parts: Sequence[Any]) -> list[str]:
@@ -47,30 +60,14 @@ def problems_of(plane: object, bodies: Sequence[Any], parts: Sequence[Any]) -> l
         *(problem for body in bodies for problem in _of_body(body, plane is not None)),
         *(problem for part in parts for problem in _of_markers(part, bodies, plane is not None)),
         *(p for of in (*bodies, *_grounds(parts)) for p in _of_shape(of, plane is not None)),
-        *(
-            p
-            for part in parts
-            if isinstance(part, Joint)
-            for p in _of_joint(part, plane is not None)
-        ),
-        *(
-            p
-            for part in parts
-            if isinstance(part, PointOnCurve)
-            for p in _of_curve(part, plane is not None)
-        ),
-        *(problem for part in parts for problem in _of_references(part, parts)),
+        *problems_of_ties(parts, plane is not None),
     ]
-
-
-def _kind(part: Any) -> str:
-    return type(part).__name__
 
 
 def _names(named: Sequence[Any]) -> Iterator[str]:
     seen: dict[str, str] = {"ground": "Ground"}
     for part in named:
-        name, kind = part.name, _kind(part)
+        name, kind = part.name, kind_of(part)
         if not isinstance(name, str) or not NAME.match(name):
             yield (
                 f"{kind} has the name {name!r}, expected one word of letters a-z, A-Z, digits and _, not "
@@ -99,7 +96,7 @@ def _of_body(body: Body, planar: bool) -> Iterator[str]:
         ]
         yield from _of_tensor(what, body.inertia)
     for of, value, unit in masses:
-        number = _value(value)
+        number = value_of(value)
         if is_number(number) and not float(number) > 0:
             yield (
                 f"{what} has the {of} {number!r}, expected a positive number in {unit}: what has none cannot "
@@ -123,13 +120,9 @@ def _of_shape(body: Body | Ground, planar: bool) -> Iterator[str]:
                 yield f"{what} {shape!r}: {wrong}"
 
 
-def _value(value: Any) -> Any:
-    return value.value if isinstance(value, Parameter) else value
-
-
 def _of_tensor(what: str, inertia: Sequence[Any]) -> Iterator[str]:
     """The principal moments of a rigid body satisfy the triangle inequality."""
-    values = [_value(x) for x in inertia]
+    values = [value_of(x) for x in inertia]
     if not all(map(is_number, values)) or min(map(float, values[:3])) <= 0:
         return
     xx, yy, zz, xy, xz, yz = [*map(float, values), 0.0, 0.0, 0.0][:6]
@@ -155,7 +148,7 @@ def _grounds(parts: Sequence[Any]) -> list[Ground]:
 
 
 def _of_markers(part: Any, bodies: Sequence[Body], planar: bool) -> Iterator[str]:
-    what = f"{_kind(part)} {part.name!r}"
+    what = f"{kind_of(part)} {part.name!r}"
     found = dict(_markers(part))
     for field, marker in found.items():
         if not isinstance(marker, Marker):
@@ -178,77 +171,11 @@ def _of_markers(part: Any, bodies: Sequence[Body], planar: bool) -> Iterator[str
             f"{what}: both markers are on {first.body.name!r}, expected two bodies: what is fixed on one "
             "body needs no joint"
         )
+    if isinstance(part, Force) and isinstance(part.at, Marker) and part.at.body == Ground():
+        yield f"{what} acts on the ground, which does not move: name a marker on a body"
     if isinstance(part, Torque) and part.on not in bodies:
         yield f"{what} acts on {part.on!r}, which is not among the bodies: name one of them"
 
 
 def _is_angle(rotation: Any) -> bool:
     return rotation is None or is_number(rotation)
-
-
-def _of_joint(joint: Joint, planar: bool) -> Iterator[str]:
-    what = f"{_kind(joint)} {joint.name!r}"
-    possible = joint.possible[0 if planar else 1]
-    where = "in the plane xy" if planar else "in space"
-    if not possible and planar:
-        yield f"{what} is a joint in space: in the plane use Revolute, Prismatic or PointOnPlane"
-        return
-    if isinstance(joint, Universal) and joint.second_axis not in tuple(AXES):
-        yield f"{what}: second_axis is {joint.second_axis!r}, expected 'x', 'y' or 'z'"
-    if joint.axis and (len(joint.axis) > 1 or joint.axis not in possible):
-        yield (
-            f"{what}: axis is {joint.axis!r}, expected {' or '.join(map(repr, possible)) or 'none'} {where}"
-        )
-    if joint.friction is not None and not joint.measures:
-        yield f"{what}: friction is given, but it leaves no motion that could rub: leave it out"
-    elif joint.friction is not None and joint.turns and not _value(joint.radius):
-        yield f"{what}: friction is given without the radius of the pin, expected radius=... in m"
-    limits = joint.limits
-    if limits is None:
-        return
-    if (joint.slides and joint.turns) or not (joint.slides or joint.turns):
-        yield f"{what}: limits are given, but it has no angle or position to be limited: leave them out"
-    elif isinstance(limits, str) or not isinstance(limits, Sequence) or len(limits) != 2:
-        yield f"{what}: limits are {limits!r}, expected the smallest and the largest value"
-    elif all(map(is_number, limits)) and not float(limits[0]) < float(limits[1]):  # type: ignore[arg-type]
-        yield f"{what}: limits are {limits!r}, expected the smaller value first: exchange them"
-
-
-def _of_curve(part: PointOnCurve, planar: bool) -> Iterator[str]:
-    what, count = f"PointOnCurve {part.name!r}", 2 if planar else len(AXES)
-    if not isinstance(part.curve, Track | Spline):
-        yield (
-            f"{what}: its curve is {part.curve!r}, expected a Track((x, y), s, first, last) of lagfmu, or in "
-            "the plane a Spline"
-        )
-    elif len(part.along()[0]) != count:
-        yield f"{what}: its curve has {len(part.along()[0])} components, expected {count}"
-
-
-def _of_references(part: Any, parts: Sequence[Any]) -> Iterator[str]:
-    """Joints that a gear, a motor or a torsion spring names."""
-    if isinstance(part, Gear):
-        named = [part.first, part.second]
-    elif isinstance(part, Motor | Torsion):
-        named = [part.joint]
-    else:
-        return
-    known = {j.name: j for j in parts if isinstance(j, Joint)}
-    fit = [n for n, j in known.items() if len(j.measures) == 1]
-    fit += [m for j in known.values() if len(j.measures) > 1 for m in j.measures]
-    alone = {m for j in known.values() for m in j.measures}
-    for joint in map(name_of_joint, named):
-        if joint in fit or joint in alone:
-            continue
-        if joint not in known:
-            yield (
-                f"{_kind(part)} {part.name!r}: no joint is called {joint!r}, expected one of "
-                f"{', '.join(fit) or 'none: no joint turns or slides'}"
-            )
-        else:
-            yield (
-                f"{_kind(part)} {part.name!r}: {_kind(known[joint])} {joint!r} has no angle or position "
-                f"or both, expected one of {', '.join(fit) or 'none: no joint turns or slides'}"
-            )
-    if len(named) == 2 and len({*map(name_of_joint, named)}) == 1:
-        yield f"Gear {part.name!r} ties {name_of_joint(named[0])!r} to itself, expected two joints"

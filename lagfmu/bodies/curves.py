@@ -114,5 +114,6 @@ class PointOnCurve:
         points = [sp.sympify(e).xreplace(known) for e in self.lengths(guess.draft)]
         found = np.zeros((PLACES, 3))
         for k, e in enumerate(points):
-            found[:, k] = sp.lambdify(over, e, "numpy")(values)
-        return values, found
+            with np.errstate(all="ignore"):
+                found[:, k] = sp.lambdify(over, e, "numpy")(values)
+        return values, np.nan_to_num(found, nan=0.0, posinf=0.0, neginf=0.0)

@@ -99,6 +99,11 @@ class Draft:
         self, value: Any, name: str, unit: str, text: str = "", positive: bool = False
     ) -> Expr:
         """The symbol of a Parameter, the expression, or that of a number, which becomes one called `name`."""
+        if isinstance(value, Parameter) and not isinstance(value.symbol, sp.Basic):
+            self.problems.append(
+                f"{name}: parameter {value.symbol!r} is no SymPy symbol: make one with sympy.symbols"
+            )
+            return sp.S.One
         if isinstance(value, Parameter):
             self.parameters[value.symbol] = value
             return value.symbol
@@ -110,7 +115,10 @@ class Draft:
                 "parameters"
             )
             return sp.S.One
-        if float(value) == 0 and not positive:
+        if positive and not float(value) > 0:
+            self.problems.append(f"{name} is {value!r}, expected a positive number in {unit}")
+            return sp.S.One
+        if float(value) == 0:
             return sp.S.Zero
         symbol = sp.Symbol(name, positive=True) if positive else sp.Symbol(name, real=True)
         self.parameters[symbol] = Parameter(symbol, float(value), unit, text)

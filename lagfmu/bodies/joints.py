@@ -29,6 +29,8 @@ from .guess import Guess, Reach
 from .motion import Placed, Timed, about, between, distance, product
 from .vectors import AXES, cross, dot, minus, plus, times
 
+CROSS = "cross"  # the row by which the axes of a universal joint stay square
+
 
 def places(draft: Draft, tie: Any) -> tuple[Placed, Placed]:
     """Both markers of a tie in the ground's axes."""
@@ -41,9 +43,9 @@ class Joint:
     """A joint of that name between the markers `first` and `second`.
 
     `axis` is that of the first marker about which it turns or along which it slides; `limits` are the
-    smallest and the largest angle [rad] or position [m], where it strikes without rebounding.  `friction`
-    (a coefficient, or the static and the kinetic one) rubs with the norm of the two radial components of its
-    force; a joint that turns needs the `radius` [m] of its pin for it.
+    smallest and the largest angle [rad] or position [m], where it strikes and, with Newton's `restitution`,
+    rebounds.  `friction` (a coefficient, or the static and the kinetic one) rubs with the norm of the two
+    radial components of its force; a joint that turns needs the `radius` [m] of its pin for it.
     """
 
     name: str
@@ -53,6 +55,7 @@ class Joint:
     limits: Sequence[Number] | None = None
     friction: Number | tuple[Number, Number] | None = None
     radius: Number = 0.0
+    restitution: Number = 0.0
 
     usual: ClassVar[tuple[str, str]] = ("z", "z")  # axis in the plane, and in space
     possible: ClassVar[tuple[str, str]] = ("z", "xyz")
@@ -127,11 +130,13 @@ class Joint:
             return
         of = draft.relative[self.measures[0]]
         acts = wrench.torque if of.unit == "rad" else wrench.force
+        text = f"restitution of {self.name} at its limits"
+        e = draft.number(self.restitution, f"{self.name}.restitution", "1", text)
         for which, sign, value in zip(("lower", "upper"), (1, -1), self.limits, strict=True):
             row = f"{self.name}.{which}"
             stop = draft.number(value, row, of.unit, f"{which} limit of {of.name}")
             text = f"{of.name} stops at its {which} limit"
-            draft.constraints.append(Contact(row, sign * (of.values[0] - stop), text))
+            draft.constraints.append(Contact(row, sign * (of.values[0] - stop), text, e))
             acts[axis] += sign * multiplier(row)
 
     def rub(self, draft: Draft, axis: int, wrench: Wrench) -> None:
@@ -233,7 +238,7 @@ class Universal(Joint):
     def rows(self, draft: Draft, a: Placed, b: Placed, axis: int, wrench: Wrench) -> None:
         """Three rows of the origins, and a1 . b2 = 0."""
         super().rows(draft, a, b, axis, wrench)
-        second, row = b.axes[AXES.index(self.second_axis)], f"{self.name}.cross"
+        second, row = b.axes[AXES.index(self.second_axis)], f"{self.name}.{CROSS}"
         draft.hold(row, product(a.axes[axis], second), f"the axes of {self.name} stay square")
         j, k = (axis + 1) % 3, (axis + 2) % 3  # b2 x a1 has no component along a1
         wrench.torque[j] += multiplier(row) * dot(second.value, a.axes[k].value)
@@ -370,4 +375,4 @@ def model_number(model: Model, value: Number) -> float:
 
 def name_of_joint(joint: Any) -> str:
     """A joint may be given by its name."""
-    return joint if isinstance(joint, str) else joint.name
+    return joint if isinstance(joint, str) else getattr(joint, "name", joint)

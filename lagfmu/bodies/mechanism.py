@@ -13,7 +13,7 @@ from ..model.elements import Input, Output, Parameter
 from ..model.model import Model
 from .assembly import assemble
 from .body import Body, Ground
-from .check import problems_of
+from .check import problems_of, problems_of_containers
 from .draft import Draft
 from .joints import Gear, Joint
 from .loads import Motor, Torsion
@@ -52,6 +52,10 @@ def mechanism(
     Raises ModelError with every problem at once; of a mechanism that cannot be closed, by how much which
     joint misses.
     """
+    lists = {"bodies": bodies, "joints": joints, "loads": loads, "contacts": contacts}
+    problems = problems_of_containers(lists, {"start": start or {}, "read": read or {}})
+    if problems:
+        raise ModelError(str(name), problems)
     parts = [*joints, *loads, *contacts, *readings_of(read or {}, plane is not None)]
     problems = problems_of(plane, bodies, parts)
     if problems:
