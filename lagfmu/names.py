@@ -44,6 +44,9 @@ DISSIPATED = "energy.dissipated"
 DISSIPATION = "der(energy.dissipated)"
 ENERGY, SOLVER = "energy", "solver"
 RATE = re.compile(r"der\((?!energy\.)([\w.]+)(?:,(\d+))?\)")
+SENSITIVITY = "sensitivity"  # of another variable, by a parameter: sensitivity.lambda.rod.by.L
+SENSITIVITY_VALID = "sensitivity.valid"
+BY = ".by."
 ERROR = "error"  # how far off another variable may be: error.lambda.rod
 STEPS = "solver.steps"
 TIME, INDICATOR, CLOCK = "time", "indicator", "clock"  # what FMI 3.0 has variables for, besides
@@ -59,16 +62,18 @@ RATES = ("", "velocity", "acceleration")  # a structured name has der() around i
 REACTIONS = (MULTIPLIER, FORCE)
 MODES = (CONTACT, STICKS)
 OF_FRICTION = (STICKS, SLIP, MARGIN, POWER, SLIPPING, STICKING)
+OF_OTHERS = (ERROR, PEAK, SENSITIVITY)  # of another variable
 RESERVED = (  # what nothing of a model's can be called
     *("Q", "contact", "count", "departure", "der", "energy", "error", "lambda", "residual"),
-    *("solver", "t", "time", "unique", "velocity"),
+    *("sensitivity", "solver", "t", "time", "unique", "velocity"),
 )
 
 
 @dataclass(frozen=True)
 class Subject:
     """What a variable is of: one of the quantities above, the constraint (contact, friction), the
-    coordinate (input, parameter, output of the model's own), the order of the time derivative."""
+    coordinate (input, parameter, output of the model's own), the order of the time derivative.  Of a
+    sensitivity the constraint is by what it is taken, the coordinate of what."""
 
     quantity: str
     constraint: str = ""
@@ -92,14 +97,26 @@ def name(quantity: str, constraint: str = "", coordinate: str = "", order: int =
     if quantity in (VALUE, OWN):
         return derivative(coordinate, order)
     head, _, tail = quantity.partition(".")
+    if quantity == SENSITIVITY:
+        return f"{head}.{_structured(coordinate)}{BY}{_structured(constraint)}"
     if head == PEAK:
-        rate = RATE.fullmatch(coordinate)
-        of = f"{RATES[int(rate[2] or 1)]}.{rate[1]}" if rate else coordinate
-        return f"{head}.{of}.{tail}"
+        return f"{head}.{_structured(coordinate)}.{tail}"
     if quantity == ERROR and (rate := RATE.fullmatch(coordinate)) and rate[2] is None:
         coordinate, order = rate[1], 1  # a structured name has der() around it or not at all
     words = (head, constraint, tail, "velocity" if order else "", coordinate)
     return ".".join(word for word in words if word)
+
+
+def _structured(variable: str) -> str:
+    """velocity.x for der(x), acceleration.x for der(x,2)."""
+    rate = RATE.fullmatch(variable)
+    return f"{RATES[int(rate[2] or 1)]}.{rate[1]}" if rate else variable
+
+
+def _plain(words: list[str]) -> str:
+    """The variable of such words."""
+    order = RATES.index(words[0]) if words[0] in RATES and len(words) > 1 else 0
+    return derivative(".".join(words[1:]), order) if order else ".".join(words)
 
 
 def derivative(coordinate: str, order: int = 1) -> str:
@@ -130,9 +147,12 @@ def read(text: str) -> Subject:
         of_velocity = rest[0] == "velocity" and len(rest) > 1
         return Subject(head, "", derivative(".".join(rest[1:])) if of_velocity else ".".join(rest))
     if f"{head}.{rest[-1] if rest else ''}" in PEAKS and len(rest) > 1:
-        order = RATES.index(rest[0]) if rest[0] in RATES and len(rest) > 2 else 0
-        of = derivative(".".join(rest[1:-1]), order) if order else ".".join(rest[:-1])
-        return Subject(f"{head}.{rest[-1]}", "", of)
+        return Subject(f"{head}.{rest[-1]}", "", _plain(rest[:-1]))
+    if text == SENSITIVITY_VALID:
+        return Subject(text)
+    if head == SENSITIVITY and BY in text:
+        of, _, by = ".".join(rest).rpartition(BY)
+        return Subject(head, _plain(by.split(".")), _plain(of.split(".")))
     if head in EVENTS and len(rest) > 1:
         *owner, last = rest
         if last in ("count", "time") or (head == CLOSING and last == "impulse"):
@@ -162,6 +182,12 @@ def measured(text: str) -> str:
     """The variable whose extreme it is; empty if it is none."""
     found = read(text)
     return found.coordinate if found.head == PEAK else ""
+
+
+def varied(text: str) -> str:
+    """The variable whose derivative along the run it is; empty if it is none."""
+    found = read(text)
+    return found.coordinate if found.quantity == SENSITIVITY else ""
 
 
 def barred(text: str) -> str:

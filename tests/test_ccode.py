@@ -75,7 +75,7 @@ void tangent_of(int full, double t, const double *q, const double *v, const doub
                 const double *p, double dt, const double *dq, const double *dv, const double *du,
                 double *dM, double *dF, double *dG, double *dnu, double *dgamma, double *df,
                 double *denergy) {
-    pick(full)->tangent(t, q, v, u, p, dt, dq, dv, du, dM, dF, dG, dnu, dgamma, df, denergy);
+    pick(full)->tangent(t, q, v, u, p, dt, dq, dv, du, NULL, dM, dF, dG, dnu, dgamma, df, denergy);
 }
 void embed_of(double t, const double *s, const double *sdot, const double *u, const double *p,
               double *q, double *v) {
@@ -84,7 +84,7 @@ void embed_of(double t, const double *s, const double *sdot, const double *u, co
 void embed_tangent_of(double t, const double *s, const double *sdot, const double *u,
                       const double *p, double dt, const double *ds, const double *dsdot,
                       const double *du, double *dq, double *dv) {
-    MODEL_SYSTEM->embed_tangent(t, s, sdot, u, p, dt, ds, dsdot, du, dq, dv);
+    MODEL_SYSTEM->embed_tangent(t, s, sdot, u, p, dt, ds, dsdot, du, NULL, dq, dv);
 }
 const int *prescribed_of(void) { return MODEL_SYSTEM->prescribed; }
 int number_of(int which) {

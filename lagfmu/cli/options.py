@@ -77,6 +77,15 @@ ErrorBars = Annotated[
         "--error-bars",
     ),
 ]
+Sensitivities = Annotated[
+    Names,
+    _needed(
+        "Outputs sensitivity.OUTPUT.by.PARAMETER: derivatives along the run, e.g. "
+        "departure.surface.time:theta,a or '*:a'; repeatable. Co-simulation only.",
+        "--sensitivities",
+        metavar="OUTPUT:PARAMETER,...",
+    ),
+]
 Name = Annotated[str | None, _needed("Another name for the FMU.")]
 
 Target = Annotated[
@@ -116,6 +125,7 @@ OPTIONS = {
     "derivatives": Derivatives,
     "reals_only": RealsOnly,
     "error_bars": ErrorBars,
+    "sensitivities": Sensitivities,
     "name": Name,
 }  # in the order of --help
 LISTS = ("outputs", "fixed", "inputs", "contacts", "frictions", "methods")

@@ -11,6 +11,7 @@ from ..errors import UsageError
 from ..model.file import ModelFile, load
 from ..model.formula import with_outputs
 from ..model.scene import Scene
+from ..model.selection import listed
 from .options import LISTS, Names, Needs
 
 
@@ -42,20 +43,7 @@ def narrowed(scenes: Sequence[Scene], needs: Needs) -> list[Scene]:
             f"{', '.join(s.name for s in scenes)}"
         )
     said = {k: v for k, v in needs.items() if v is not None}
-    said |= {k: _split(said[k]) for k in LISTS if k in said}
+    said |= {
+        k: tuple(name for text in said[k] for name in listed(text)) for k in LISTS if k in said
+    }
     return [replace(s, **said) for s in scenes]
-
-
-def _split(texts: Sequence[str]) -> tuple[str, ...]:
-    """NAME,NAME as names; a comma within parentheses belongs to the name, as in der(x,2)."""
-    found: list[str] = []
-    for text in texts:
-        depth, word = 0, ""
-        for letter in f"{text},":
-            depth += (letter == "(") - (letter == ")")
-            if letter == "," and depth <= 0:
-                found.append(word.strip())
-                word = ""
-            else:
-                word += letter
-    return tuple(w for w in found if w)

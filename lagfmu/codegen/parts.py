@@ -4,7 +4,7 @@
     q' = B(q,t,u) v + b(q,t,u), or q' = v
 
 M is listed by the non-zeros of its lower triangle, G and B by their non-zeros, sorted by row, then column.  A
-tangent is the change of a function's results along a direction in t, q, v and u; d(x) is the change of x.
+tangent is the change of a function's results along a direction in t, q, v, u and p; d(x) is the change of x.
 """
 
 from __future__ import annotations
@@ -69,7 +69,8 @@ class Parts:
     """Of one system: its coordinates, the `constraints` that are its rows, its functions and patterns.
 
     `prefix` begins the names of all that is defined for it; `jumps`: those of its forces.  `reduction`: what
-    leads from it to `full`, the equations of all coordinates.  `tangents`: its functions have them.
+    leads from it to `full`, the equations of all coordinates.  `tangents`: its functions have them; `by`:
+    the names of parameters by which they are taken as well.
     """
 
     eom: EquationsOfMotion
@@ -80,6 +81,7 @@ class Parts:
     full: EquationsOfMotion | None = None
     reduction: Reduction | None = None
     tangents: bool = False
+    by: frozenset[str] = frozenset()
     time: Expr = TIME
 
     # ------------------------------------------------------------------------ patterns
@@ -196,9 +198,14 @@ class Parts:
     @cached_property
     def change(self) -> dict[Expr, Expr]:
         """d(x) of each symbol that changes."""
-        moving = (*self.eom.q, *self.eom.v, *self.eom.u, self.time)
+        moving = (*self.eom.q, *self.eom.v, *self.eom.u, *self.varied, self.time)
         reported = (s for group in self.solved.values() for s in group)
         return {s: sp.Symbol(f"d({s})", real=True) for s in (*moving, *reported)}
+
+    @cached_property
+    def varied(self) -> tuple[Expr, ...]:
+        """The parameters, where tangents are taken by some of them."""
+        return tuple(self.eom.p) if self.by else ()
 
     @cached_property
     def groups(self) -> dict[str, list[Value]]:
@@ -251,7 +258,7 @@ class Parts:
             found.append(Function("energies", text, state, {"energy": groups["energy"]}))
         found += self._of_contacts()
         if self.tangents and (groups["energy"] or not eom.bare):
-            text = "The change of all of these along the direction (dt, dq, dv, du)."
+            text = "The change of all of these along the direction (dt, dq, dv, du, dp)."
             found.append(self._tangent("tangent", text, state, groups))
         if eom.lookups:
             places = values([x for _, x in eom.lookups], [s.name for s, _ in eom.lookups])
@@ -282,7 +289,7 @@ class Parts:
         }
         yield Function("kinematics", "Rates B and drift b of  q' = B v + b.", still, results)
         if self.tangents:
-            text = "Their change along the direction (dt, dq, du)."
+            text = "Their change along the direction (dt, dq, du, dp)."
             yield self._tangent("kinematics_tangent", text, still, results)
         if eom.unwrapped:
             angles = values([*eom.unwrapped.values()], [eom.q[j] for j in eom.unwrapped])
@@ -340,18 +347,18 @@ class Parts:
         results = {"q": values(phi, self.full.q), "v": values(vel, self.full.v)}
         found = [Function("embed", EMBED, state, results)]
         if self.tangents:
-            text = "The change of q and v along the direction (dt, ds, dsdot, du)."
+            text = "The change of q and v along the direction (dt, ds, dsdot, du, dp)."
             found.append(self._tangent("embed_tangent", text, state, results))
         return found
 
     def _tangent(
         self, name: str, doc: str, arguments: Arguments, results: Mapping[str, Sequence[Value]]
     ) -> Function:
-        d = Differential(self.change)
+        kept = {p for p in self.varied if str(p) not in self.by}
+        d = Differential({s: change for s, change in self.change.items() if s not in kept})
         along = {
             f"d{a}": tuple(self.change[s] for s in symbols if s in self.change)
             for a, symbols in arguments.items()
-            if a != "p"
         }
         changes = {
             f"d{a}": [Value(d(x.expression), x.place) for x in group]
@@ -365,14 +372,19 @@ def _or_zero(expressions: Any) -> list[Expr]:
 
 
 def parts_of(
-    form: Form, jumps: Jumps, tangents: bool = False, time: Expr = TIME
+    form: Form,
+    jumps: Jumps,
+    tangents: bool = False,
+    time: Expr = TIME,
+    by: frozenset[str] = frozenset(),
 ) -> tuple[Parts, ...]:
     """The system of all coordinates and, where it is reduced, the one of those that are stepped.
 
-    `form` and `jumps` as jumps.with_switch_states gives them; `time`: the symbol in them.
+    `form` and `jumps` as jumps.with_switch_states gives them; `time`: the symbol in them; `by`: parameters by
+    which tangents are taken as well.
     """
     eom, reduction = form.equations, form.reduction
-    more: dict[str, Any] = {"tangents": tangents, "time": time}
+    more: dict[str, Any] = {"tangents": tangents, "by": by, "time": time}
     if reduction is None:
         return (Parts(eom, "", form.formulation, eom.constraints, jumps, **more),)
     reduced = reduction.reduced

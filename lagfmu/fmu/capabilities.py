@@ -49,7 +49,8 @@ DERIVATIVES = {
 
 def offers_exchange(prepared: Prepared) -> bool:
     """Model exchange besides co-simulation: not where the FMU runs twice, or keeps points of an input."""
-    return not (prepared.system.estimated or prepared.scene.error_bars)
+    scene = prepared.scene
+    return not (prepared.system.estimated or scene.error_bars or scene.sensitivities)
 
 
 def interfaces_of(prepared: Prepared, face: Face) -> dict[str, dict[str, str]]:

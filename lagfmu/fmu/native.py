@@ -122,7 +122,9 @@ def sources_of(prepared: Prepared, listed: bool = True, face: Face = USUAL) -> S
     integrators = held(scene, form)
     gone = files_left_out(scene, system, integrators, bool(table.measured))
     generated = {
-        "model.c": model_source(form, needs_tangents(scene, system)).encode(),
+        "model.c": model_source(
+            form, needs_tangents(scene, system), frozenset(table.varied)
+        ).encode(),
         "variables.c": variables_source(table, form, scene, system).encode(),
         "optional.c": optional_source(scene, system, integrators, bool(table.measured)).encode(),
     }

@@ -123,6 +123,8 @@ def refusals(prepared: Prepared) -> list[str]:
         found.append("its forces do not jump")
     if scene.error_bars:
         found.append("it has no error bars")
+    if scene.sensitivities:
+        found.append("it takes no derivatives of a run")
     peaks = dict.fromkeys(v.of.coordinate for v in prepared.table.those(*names.PEAKS))
     found += [f"it tells no extremes (peak.{name})" for name in peaks]
     if scene.method not in IN_PYTHON:

@@ -357,6 +357,24 @@ class Outputs:
             or (v.of.quantity == names.VALUE and v.of.order < 2 and v.role in ("output", "start"))
         ]
 
+    def sensitivities(self, pairs: Iterable[tuple[Variable, Variable]]) -> list[Variable]:
+        """The derivative of the first by the second of each pair, and whether they exist."""
+        made = [self._sensitivity(of, by) for of, by in pairs]
+        text = "true while the run's derivatives exist; where it is false they are 0"
+        valid = self.output(Subject(names.SENSITIVITY_VALID), text, None, (), "Boolean")
+        return [*made, valid] if made else []
+
+    def _sensitivity(self, of: Variable, by: Variable) -> Variable:
+        text = f"derivative of {of.name} by {'the start of ' * (by.role == 'start')}{by.name}"
+        made = self.output(
+            Subject(names.SENSITIVITY, by.name, of.name),
+            text + ", along the run and through its events",
+            (of.unit or ONE) / (by.unit or ONE),
+            (),
+            discrete=of.variability == "discrete",
+        )
+        return dataclasses.replace(made, depends=of.depends, depends_initially=of.depends_initially)
+
     def peaks(self, measurable: Iterable[Variable]) -> list[Variable]:
         """The extremes that the model asks for, of what is there."""
         known = {v.name: v for v in measurable}

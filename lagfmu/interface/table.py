@@ -16,6 +16,7 @@ from ..model.units import DisplayUnit, parse_scaled
 from ..names import derivative
 from .dependencies import Dependencies
 from .outputs import Outputs
+from .sensitivities import differentiated
 from .settable import drives, parameters, solver_settings
 from .variables import Variable, VariableTable
 
@@ -39,7 +40,8 @@ def variable_table(form: Form, scene: Scene) -> VariableTable:
 
 def _table(form: Form, scene: Scene) -> VariableTable:
     eom, behind = form.equations, Dependencies(form)
-    loses = bool(eom.frictions) and not scene.error_bars and not eom.estimated
+    alone = not (scene.error_bars or scene.sensitivities or eom.estimated)
+    loses = bool(eom.frictions) and alone
     outputs = Outputs(behind, loses)
     variables = [
         *parameters(eom),
@@ -49,7 +51,9 @@ def _table(form: Form, scene: Scene) -> VariableTable:
     ]
     if scene.error_bars:
         variables += outputs.error_bars(variables)
-    variables += outputs.peaks(VariableTable(tuple(variables), (), ()).measurable)
+    measurable = VariableTable(tuple(variables), (), ()).measurable
+    variables += outputs.sensitivities(differentiated(variables, scene.sensitivities, []))
+    variables += outputs.peaks(measurable)
     shown = eom.model.display_units
     variables = [replace(v, display=_displayed(v, shown.get(v.of.coordinate))) for v in variables]
     states = outputs.behind.states

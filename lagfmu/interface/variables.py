@@ -118,6 +118,11 @@ class VariableTable:
         states, derivatives = (tuple(p[k] for p in moving) for k in (0, 1))
         return VariableTable(kept, states, derivatives)
 
+    @cached_property
+    def varied(self) -> tuple[str, ...]:
+        """The parameters and start values by which derivatives are taken."""
+        return tuple(dict.fromkeys(v.of.constraint for v in self.those(names.SENSITIVITY)))
+
     @property
     def measurable(self) -> tuple[Variable, ...]:
         """What may have a peak: the continuous outputs."""

@@ -110,7 +110,7 @@ def subjects(form: Form) -> Callable[[str], tuple[Indices, Indices]]:
             return _positions(eom, set().union(*parts)), NONE
         if of.quantity == names.DISSIPATED:
             return NONE, losing
-        if of.quantity in (names.ERROR, *names.PEAKS):  # what they are of is asked for besides
+        if of.head in names.OF_OTHERS:  # what they are of is asked for besides
             return NONE, NONE
         speeds = forced if of.quantity == names.FORCE else moved
         acting = slipping if of.head in names.OF_FRICTION else rows

@@ -17,6 +17,7 @@ from .elements import NAME, is_number
 
 FORMULATIONS = ("multipliers", "nullspace", "minimal")
 EVERYTHING = ("*",)
+VARIED = ("dop853", "rk4")  # methods whose steps are differentiated
 
 
 @dataclass(frozen=True)
@@ -46,6 +47,10 @@ class Scene:
     `error_bars`: besides each lambda, Q, coordinate, velocity, output of the model's own and time of an
     event that is an output, `error.NAME`: an estimate of how far this run's
     value may be off, by a finer run (docs/error_bars.md); co-simulation only.
+    `sensitivities`: derivatives of what the FMU reports, as 'lambda.surface:a' or
+    'departure.surface.time:theta,a': `sensitivity.OUTPUT.by.PARAMETER` by parameters and start values
+    (patterns, * for all), along the run and through its events (docs/sensitivities.md); native
+    co-simulation by dop853 (which `auto` then is) or rk4.
     `derivatives`: whether a native FMU offers directional derivatives; None: unless `outputs` are
     named.
 
@@ -69,6 +74,7 @@ class Scene:
     derivatives: bool | None = None
     reals_only: bool = False
     error_bars: bool = False
+    sensitivities: Sequence[str] = ()
 
     def __post_init__(self) -> None:
         problems = []
@@ -96,8 +102,10 @@ class Scene:
             problems.append(problem)
         if not is_number(self.step) or self.step < 0:
             problems.append(f"step = {self.step!r}, expected a positive number, or 0")
-        for what in ("outputs", "fixed", "inputs", "contacts", "frictions"):
+        for what in ("outputs", "fixed", "inputs", "contacts", "frictions", "sensitivities"):
             problems += self._listed(what)
+        if self.sensitivities and not problems:
+            problems += self._varied()
         if self.methods is not None:
             wanted = {self.method, *self.methods}
             chosen = tuple(m for m in METHODS if m in wanted)
@@ -111,9 +119,28 @@ class Scene:
         value = getattr(self, what)
         if isinstance(value, str) or not all(isinstance(x, str) for x in value):
             return [f"{what} = {value!r}, expected a list of names, e.g. {what}=['m']"]
-        whole = "*" in value and what != "fixed"
+        whole = "*" in value and what not in ("fixed", "sensitivities")
         object.__setattr__(self, what, EVERYTHING if whole else tuple(value))
         return []
+
+    def _varied(self) -> list[str]:
+        """Pairs that can be read, methods whose steps can be differentiated."""
+        problems = [
+            f"sensitivities: {text!r}, expected OUTPUT:PARAMETER,..., e.g. 'lambda.surface:a'"
+            for text in self.sensitivities
+            if not all(text.partition(":")[::2])
+        ]
+        if self.method == "auto":
+            object.__setattr__(self, "method", "dop853")
+        chosen = [self.method, *(m for m in self.methods or () if m != "auto")]
+        problems += [
+            f"sensitivities with the method {m!r}: expected {' or '.join(VARIED)}, whose steps are "
+            "differentiated"
+            for m in chosen
+            if m not in VARIED
+        ]
+        object.__setattr__(self, "methods", tuple(chosen) if self.methods else None)
+        return problems
 
     @property
     def whole(self) -> Scene:
@@ -126,6 +153,7 @@ class Scene:
             contacts=EVERYTHING,
             methods=None,
             derivatives=None,
+            sensitivities=(),
         )
 
     @property
@@ -140,6 +168,8 @@ class Scene:
             return (self.method,)
         if self.methods is not None:
             return tuple(self.methods)
+        if self.sensitivities:
+            return VARIED if self.complete else (self.method,)
         return METHODS if self.complete else (self.method,)
 
     @property

@@ -23,3 +23,17 @@ def select(
             hint = f"; did you mean {', '.join(map(repr, near))}?" if near else "; there is none"
             problems.append(f"{what} {name!r} is unknown{hint}")
     return tuple(k for k in known if k in found)
+
+
+def listed(text: str) -> tuple[str, ...]:
+    """NAME,NAME as names; a comma within parentheses belongs to the name, as in der(x,2)."""
+    found: list[str] = []
+    depth, word = 0, ""
+    for letter in f"{text},":
+        depth += (letter == "(") - (letter == ")")
+        if letter == "," and depth <= 0:
+            found.append(word.strip())
+            word = ""
+        else:
+            word += letter
+    return tuple(w for w in found if w)

@@ -8,6 +8,7 @@ from dataclasses import replace
 from ..codegen.py.equations import compile_system, source
 from ..codegen.py.equations import lower as lowered_form
 from ..errors import RequestError
+from ..interface.sensitivities import named
 from ..interface.table import variable_table
 from ..mechanics import equations as mechanics
 from ..mechanics import fold, prune
@@ -71,7 +72,9 @@ def reduce(narrowed: Narrowed) -> Reduced:
             equations = replace(equations, outputs=own)
         form = replace(form, equations=equations, reduction=reduction)
         coded = prune.read_only(replace(form, equations=prune.silent(form.equations, read)), read)
-        fixed |= fold.values(fold.idle(_with_numbers(coded, fixed)), narrowed.model)
+        asked = named(scene.sensitivities)
+        idle = [p for p in fold.idle(_with_numbers(coded, fixed)) if str(p) not in asked]
+        fixed |= fold.values(idle, narrowed.model)
         damped = fold.damped(coded.equations, fixed)
         if scene.method == "auto" and scene.methods is None and not damped:
             scene = replace(scene, method="dop853")

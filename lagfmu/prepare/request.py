@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 from .. import names
 from ..errors import DerivationError, ModelError, RequestError
+from ..interface.sensitivities import differentiated, named
 from ..interface.table import variable_table
 from ..mechanics import prune
 from ..mechanics.equations import EquationsOfMotion
@@ -42,6 +43,7 @@ def formulated(derived: Derived, acting: EquationsOfMotion, problems: list[str])
         chosen = replace(scene, formulation=scene.formulation or "multipliers")
         form = _form(acting, chosen)
         found = _asked(form, chosen, problems)
+    problems += _unknown_sensitivities(found)
     if problems:
         raise RequestError(scene.name, problems)
     _check_peaks(derived, found.scene, found.form)
@@ -102,14 +104,27 @@ def _check_peaks(derived: Derived, scene: Scene, form: Form) -> None:
         raise ModelError(derived.model.name, problems)
 
 
+def _unknown_sensitivities(found: Asked) -> list[str]:
+    """What the scene takes derivatives of, or by, and is not there to be read or set."""
+    scene, problems = found.scene, list[str]()
+    whole = variable_table(found.form, replace(scene, sensitivities=()))
+    differentiated(whole.variables, scene.sensitivities, problems)
+    fixed = {text.partition("=")[0].strip() for text in scene.fixed}
+    problems += [
+        f"sensitivities by {name!r}, which the scene fixes: leave it out of `fixed`"
+        for name in sorted(named(scene.sensitivities))
+        if name in fixed
+    ]
+    return problems
+
+
 def _asked(form: Form, scene: Scene, problems: list[str]) -> Asked:
     known = [v.name for v in variable_table(form, scene).outputs]
     found = set(select(scene.outputs, known, "output", problems))
     found |= {names.barred(name) for name in found}  # a bar is of an output, ...
     found |= {names.bar(name) for name in found}  # ... and an output has its own
+    found |= {name for name in known if names.read(name).head == names.SENSITIVITY}
     outputs = tuple(name for name in known if name in found)
-    measured = [
-        names.measured(name) for name in outputs
-    ]  # extremes are of what is computed for them
-    read = tuple(dict.fromkeys((*outputs, *(name for name in measured if name))))
+    behind = [names.measured(name) or names.varied(name) for name in outputs]
+    read = tuple(dict.fromkeys((*outputs, *(name for name in behind if name))))
     return Asked(scene, form, outputs, read)

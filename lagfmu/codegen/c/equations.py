@@ -41,10 +41,11 @@ HEAD = """/* model.c -- {name}{description}
 POINTER = "\nSHARED_VALUE const System *const MODEL_SYSTEM = &{}equations;\n"
 
 
-def model_source(form: Form, tangents: bool = True) -> str:
+def model_source(form: Form, tangents: bool = True, by: frozenset[str] = frozenset()) -> str:
     """C text that defines MODEL_SYSTEM, the numeric form of the equations.
 
-    `tangents`: with the derivatives that directional derivatives and radau5 need.
+    `tangents`: with the derivatives that directional derivatives and radau5 need; `by`: parameters by which
+    they are taken as well.
 
     Raises DerivationError if a function or a number has no counterpart in C.
     """
@@ -52,7 +53,7 @@ def model_source(form: Form, tangents: bool = True) -> str:
     given = form.equations
     symbols = _real([*given.q, *given.v, *given.u, *given.p, TIME])
     time = symbols.get(TIME, TIME)
-    whole = parts_of(_in_reals(form), jumps.mapped(symbols), tangents, time)
+    whole = parts_of(_in_reals(form), jumps.mapped(symbols), tangents, time, by)
     eom = whole[0].eom
     index = _index("coordinates", eom.q)
     if not eom.moves_plainly:
@@ -130,7 +131,8 @@ def _names(parts: Parts) -> dict[Expr, str]:
     """The C names of the symbols of a state, and of their changes."""
     eom, change = parts.eom, parts.change
     moving = [*eom.q, *eom.v, *eom.u]
-    names = identifiers([*moving, *eom.p, *eom.switch_states, *(change[s] for s in moving)])
+    varied = [*moving, *parts.varied]
+    names = identifiers([*moving, *eom.p, *eom.switch_states, *(change[s] for s in varied)])
     return names | {parts.time: "t", change[parts.time]: "dt"}
 
 

@@ -18,6 +18,13 @@ AT_CONTACTS = {
     "modes_contradicted": "modes.c",
 }
 PEAKS, PASSAGE = "peaks.c", "passage.c"  # behind PEAKS and PASSAGE
+DERIVATIVES = (
+    "beside.c",
+    "derivatives.c",
+    "kept.c",
+    "saltation.c",
+    "variation.c",
+)  # behind VARIATION
 BEHIND_BOTH = "extreme.c"
 MOTIONS = ("prescribed.c", "rates.c")  # behind PRESCRIBED of variables.c
 FRICTION = (  # behind FRICTION_EVENTS
@@ -76,17 +83,21 @@ def optional_source(
     rows += ["    .peaks = &PEAKS,\n"] if peaks else []
     rows += ["    .passage = &PASSAGE,\n"] if _may_pass(system) else []
     rows += ["    .friction = &FRICTION_EVENTS,\n"] if system.frictions else []
+    rows += ["    .variation = &VARIATION,\n"] if scene.sensitivities else []
     what = ", ".join(found) + (", contacts" if contacts else "")
     what += ", frictions" if system.frictions else ""
     what += ", error bars" if scene.error_bars else ""
+    what += ", derivatives of a run" if scene.sensitivities else ""
     rungs = "" if system.is_constrained else NO_RUNGS
     rungs += "" if _moves(system) else NO_KINEMATICS
     return HEAD.format(name=scene.name, what=what, rungs=rungs) + "".join(rows) + "};\n"
 
 
 def needs_tangents(scene: Scene, system: System) -> bool:
-    """True if derivatives of the equations are offered, or needed by an implicit method; with frictions,
-    of whose force they know nothing, never."""
+    """True if derivatives of the equations or of a run are offered, or needed by an implicit method; with
+    frictions, of whose force they know nothing, only for those of a run."""
+    if scene.sensitivities:
+        return True
     if system.frictions:
         return False
     return scene.differentiable or "radau5" in scene.integrators
@@ -101,6 +112,8 @@ def files_left_out(
         gone |= {*FRICTION}
     if not scene.error_bars:
         gone.add("bars.c")  # behind ERROR_BARS of variables.c
+    if not scene.sensitivities:
+        gone |= {*DERIVATIVES}
     if not peaks:
         gone.add(PEAKS)
     if not _may_pass(system):

@@ -25,6 +25,7 @@ HEAD = """/* variables.c -- {name}: the variables of the FMU, in the order of mo
 #include <stddef.h>
 
 #include "bars.h"
+#include "derivatives.h"
 #include "identity.h"
 #include "prescribed.h"
 #include "state.h"
@@ -44,8 +45,17 @@ SHARED_VALUE const double DEFAULT_TOLERANCE = {tolerance};
 SHARED_VALUE const int DEFAULT_METHOD = {method};
 SHARED_VALUE const int EXCHANGE_LOST = {lost};
 SHARED_VALUE const Prescribed *const PRESCRIBED = {motions};
-{bars}"""
+{bars}{derivatives}"""
 NO_BARS = "SHARED_VALUE const ErrorBars *const ERROR_BARS = NULL;\n"
+NO_COLUMNS = (
+    "SHARED_VALUE const Column *const COLUMNS = NULL;\nSHARED_VALUE const int COLUMN_COUNT = 0;\n"
+    "SHARED_VALUE const Derivatives *const DERIVATIVES = NULL;\n"
+)
+WITH_COLUMNS = (
+    "SHARED_VALUE const Column *const COLUMNS = (const Column[]){{{columns}}};\n"
+    "SHARED_VALUE const int COLUMN_COUNT = {count};\n"
+    "SHARED_VALUE const Derivatives *const DERIVATIVES = &OF_RUN;\n"
+)
 WITH_BARS = "SHARED_VALUE const ErrorBars *const ERROR_BARS = &BARS;\n"
 
 
@@ -57,6 +67,7 @@ def variables_source(table: VariableTable, form: Form, scene: Scene, system: Sys
     position = {v.name: k for k, v in enumerate(table.variables)}
     number = {v.name: k for k, v in enumerate(v for v in table.variables if v.bar_of)}
     peaks = {name: k for k, name in enumerate(table.measured)}
+    column = {name: k for k, name in enumerate(table.varied)}
     rows = []
     answered = {
         v.name: (quantity.upper(), k, NONE)
@@ -68,6 +79,8 @@ def variables_source(table: VariableTable, form: Form, scene: Scene, system: Sys
             continue
         if v.bar_of:
             at = "ERROR", position[v.bar_of], number[v.name]
+        elif v.of.quantity == names.SENSITIVITY:
+            at = "SENSITIVITY", position[v.of.coordinate], column[v.of.constraint]
         else:
             at = answered.get(v.name) or place.of(v, peaks)
         rows.append(f"    {_row(v, at, states)},\n")
@@ -82,9 +95,20 @@ def variables_source(table: VariableTable, form: Form, scene: Scene, system: Sys
         lost=int(names.DISSIPATED in table.states),
         motions="&MOTIONS" if system.prescribed else "NULL",
         bars=WITH_BARS if scene.error_bars else NO_BARS,
+        derivatives=_columns([str(s) for s in eom.p], states, table.varied),
         peaked=f"(const Variable[]){{\n{''.join(measured)}}}" if measured else "NULL",
         peaks=len(measured),
     )
+
+
+def _columns(parameters: Sequence[str], states: Mapping[str, int], varied: Sequence[str]) -> str:
+    """By what derivatives are taken: a parameter's number, or that of the state that starts with it."""
+    if not varied:
+        return NO_COLUMNS
+    numbers = {name: f"{k}, -1" for k, name in enumerate(parameters)}
+    numbers |= {name: f"-1, {j}" for name, j in states.items()}
+    columns = ", ".join(f"{{{string(name)}, {numbers[name]}}}" for name in varied)
+    return WITH_COLUMNS.format(columns=columns, count=len(varied))
 
 
 ALONE = {  # where a value lies of which there is one
@@ -99,6 +123,7 @@ ALONE = {  # where a value lies of which there is one
     names.TOTAL: "TOTAL",
     names.DISSIPATED: "LOST",
     names.DISSIPATION: "LOST_RATE",
+    names.SENSITIVITY_VALID: "SENSITIVITY_VALID",
 }
 OF_ROW = {names.MULTIPLIER: "LAMBDA", names.UNIQUE: "UNIQUE", names.RESIDUAL: "RESIDUAL"}
 OF_CONTACT = {names.CONTACT: "CONTACT", names.IMPULSE: "IMPULSE"}

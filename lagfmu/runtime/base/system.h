@@ -89,7 +89,7 @@ struct System {
     const int *rate_row, *rate_column;
     void (*kinematics)(double t, const double *q, const double *u, const double *p, double *B, double *b);
     void (*kinematics_tangent)(double t, const double *q, const double *u, const double *p, double dt,
-                               const double *dq, const double *du, double *dB, double *db);
+                               const double *dq, const double *du, const double *dp, double *dB, double *db);
     /* Unit quaternions: four places in q each, of e0 to e3.  Angles that equal `angle` (unwrapped_count) modulo
      * 2 pi: their places in q.  0 and NULL without. */
     int quaternions, unwrapped_count;
@@ -113,12 +113,12 @@ struct System {
     int started_count;
     const int *started;
     void (*starts)(const double *p, double *w);
-    /* The derivative of all of these along the direction (dt, dq, dv, du): what changes in the values
+    /* The derivative of all of these along the direction (dt, dq, dv, du, dp): what changes in the values
      * when the state moves that way.  dM (masses), dF (nv), dG (entries), dnu, dgamma, df (m),
-     * denergy (2).  NULL where nobody asks for derivatives. */
+     * denergy (2).  NULL where nobody asks for derivatives; dp is read where a run's are asked for. */
     void (*tangent)(double t, const double *q, const double *v, const double *u, const double *p,
-                    double dt, const double *dq, const double *dv, const double *du, double *dM,
-                    double *dF, double *dG, double *dnu, double *dgamma, double *df,
+                    double dt, const double *dq, const double *dv, const double *du, const double *dp,
+                    double *dM, double *dF, double *dG, double *dnu, double *dgamma, double *df,
                     double *denergy);
 
     /* The model's own outputs w (output_count), from a state and what is solved for there; `other` is
@@ -135,8 +135,8 @@ struct System {
     void (*outputs_tangent)(double t, const double *q, const double *v, const double *u,
                             const double *p, const double *vdot, const double *lambda,
                             const double *Q, double dt, const double *dq, const double *dv,
-                            const double *du, const double *dvdot, const double *dlambda,
-                            const double *dQ, double *dw, double *dother);
+                            const double *du, const double *dp, const double *dvdot,
+                            const double *dlambda, const double *dQ, double *dw, double *dother);
 
     /* Where tables are looked up (lookup_count), and where these begin and end.  NULL without any. */
     int lookup_count;
@@ -152,7 +152,7 @@ struct System {
                   double *q, double *v);
     void (*embed_tangent)(double t, const double *s, const double *sdot, const double *u,
                           const double *p, double dt, const double *ds, const double *dsdot,
-                          const double *du, double *dq, double *dv);
+                          const double *du, const double *dp, double *dq, double *dv);
     const System *full;
 
     /* Frictions; 0 and NULL without. */

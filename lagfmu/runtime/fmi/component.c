@@ -66,6 +66,11 @@ Status component_exchanges(const char *function, Why *why) {
                     "%s: error bars come from a finer run beside the FMU's own, and in Model Exchange the importer "
                     "integrates: take co-simulation, or an FMU without",
                     function);
+    if (DERIVATIVES != NULL)
+        return fail(why,
+                    "%s: a run's derivatives are integrated beside its state, and in Model Exchange the importer "
+                    "integrates: take co-simulation, or an FMU without",
+                    function);
     return OK;
 }
 

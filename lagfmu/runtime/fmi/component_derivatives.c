@@ -27,7 +27,7 @@ static Direction no_direction(Sensitivity *w) {
     memset(w->dq, 0, (size_t)s->nq * sizeof *w->dq);
     memset(w->dv, 0, (size_t)s->nv * sizeof *w->dv);
     memset(w->du, 0, (size_t)s->inputs * sizeof *w->du);
-    return (Direction){0, w->dq, w->dv, w->du};
+    return (Direction){0, w->dq, w->dv, w->du, w->dp};
 }
 
 /* A known variable, by whose change something else is to change. */

@@ -22,6 +22,8 @@ void instance_layout(Instance *x, Arena *arena) {
     const System *system = MODEL_SYSTEM;
     x->solver.peaks = PEAK_COUNT;
     x->solver.measure = measure_peaked;
+    x->solver.columns = COLUMN_COUNT;
+    x->solver.column = COLUMNS;
     Arena saved = {NULL, 0}, scratch = {NULL, 0};
     for (int pass = 0; pass < 2; pass++) {
         solver_layout(&x->solver, &saved, &scratch, system);
@@ -46,6 +48,7 @@ void instance_layout(Instance *x, Arena *arena) {
         x->places = arena_doubles(&scratch, system->lookup_count);
         if (system->full != NULL) sensitivity_layout(&x->along, &scratch, system->full);
         if (ERROR_BARS != NULL) ERROR_BARS->layout(x, &saved, &scratch);
+        if (DERIVATIVES != NULL) DERIVATIVES->layout(x, &scratch);
         if (pass == 1) break;
         x->saved_size = saved.used;
         const size_t scratch_size = scratch.used;

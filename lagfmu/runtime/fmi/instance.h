@@ -42,6 +42,7 @@ typedef struct Instance {
     int started;            /* 1: the consistent start has been found */
     int running;            /* 1: the start is over, only inputs can be set */
     Bars *bars;             /* error bars; NULL without */
+    struct Derived *derived; /* of derivatives.c; NULL without a run's derivatives */
     Past *past;             /* (estimated_count of the system) */
     double gain;            /* [1/s] of model exchange's stabilization; < 0: not known yet */
     int ticking;            /* 1: an event of this instant has been met, and not yet what follows from it */
@@ -113,6 +114,9 @@ SHARED Status instance_steppable(Instance *x, double t, double h);
 
 /* The consistent start, unless it is known already. */
 SHARED Status instance_start(Instance *x);
+
+/* The start from the values that were set, with that of `state` (-1: none) moved by `part` as if it had been set. */
+SHARED Status instance_start_again(Instance *x, int state, double part);
 
 /* What can be read at the state, unless it is known already. */
 SHARED Status instance_observe(Instance *x);

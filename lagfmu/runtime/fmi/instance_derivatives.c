@@ -12,7 +12,7 @@
 static Status factor(Instance *x, Instant *at) {
     Solver *s = &x->solver;
     const System *full = s->system->full;
-    if (s->system->tangent == NULL)
+    if (s->system->tangent == NULL || s->system->frictions > 0)
         return fail(&s->why, "this FMU was built for a scene without derivatives of its outputs");
     if (instance_observe(x) != OK) return FAILED;
     *at = segment_instant(s, s->state.now.t);
@@ -36,8 +36,8 @@ static Status change_all(Instance *x, Instant at, Direction d, Differentiate sol
     }
     Sensitivity *w = &x->along;
     s->system->embed_tangent(at.t, s->state.q, s->state.v, at.u, at.p, d.dt, d.dq, d.dv, d.du,
-                             w->dq, w->dv);
-    const Direction wide = {d.dt, w->dq, w->dv, d.du};
+                             d.dp, w->dq, w->dv);
+    const Direction wide = {d.dt, w->dq, w->dv, d.du, d.dp};
     if (full->dynamics == NULL) {
         sensitivity_of_energies(w, full, at, x->seen.q, x->seen.v, wide);
         outputs_change(w, NULL, full, at, &x->seen, wide);
@@ -80,7 +80,7 @@ Status instance_change(const Instance *x, const Variable *v, Direction d, double
         case AT_OUTPUT: *change = w->down[v->index]; break;
         case AT_INPUT: *change = d.du[v->index]; break;
         case AT_TIME: *change = d.dt; break;
-        case AT_ERROR: case AT_INDICATOR: *change = NAN; break; /* it is not known, or not asked for */
+        case AT_ERROR: case AT_INDICATOR: case AT_SENSITIVITY: *change = NAN; break; /* it is not known, or not asked for */
         default: break; /* discrete ones and parameters: none */
     }
     if (v->place == AT_LAMBDA && !x->seen.unique[v->index])
@@ -100,7 +100,7 @@ Status instance_rates(Instance *x, Direction *d) {
         const int order = PRESCRIBED == NULL ? -1 : PRESCRIBED->order(x, k);
         w->du[k] = order < 0 ? s->drive.first[k] : PRESCRIBED->rate(x, k, order);
     }
-    *d = (Direction){1, w->dq, w->dv, w->du};
+    *d = (Direction){1, w->dq, w->dv, w->du, w->dp};
     return instance_differentiate(x, *d);
 }
 

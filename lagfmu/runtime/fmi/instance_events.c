@@ -49,6 +49,7 @@ void instance_tell_events(Instance *x) {
     for (int c = 0; c < x->solver.system->contacts; c++)
         closed |= x->solver.state.latest[CLOSING].count[c] != x->before[CLOSING][c];
     if (closed) instance_warn_of_shares(x);
+    if (DERIVATIVES != NULL) DERIVATIVES->tell(x);
 }
 
 void instance_count_events(Instance *x) {

@@ -110,6 +110,20 @@ void instance_warn_of_shares(Instance *x) {
     }
 }
 
+Status instance_start_again(Instance *x, int state, double part) {
+    Solver *s = &x->solver;
+    if (find_begin(x) != OK) return FAILED;
+    Priority held = OMITTED;
+    if (state >= 0) {
+        x->begin[state] += part;
+        held = x->priority[state];
+        x->priority[state] = SET;
+    }
+    const Status status = solver_start(s, x->start_time, x->begin, x->begin + s->system->nq, x->priority, NULL, NULL);
+    if (state >= 0) x->priority[state] = held;
+    return status;
+}
+
 static Status find_start(Instance *x) {
     Solver *s = &x->solver;
     if (find_begin(x) != OK) return FAILED;
@@ -121,6 +135,7 @@ static Status find_start(Instance *x) {
     if (x->exchange && nominals_incomplete(s) &&
         nominals_complete(s, segment_instant(s, x->start_time), 1) != OK)
         return FAILED;
+    if (DERIVATIVES != NULL && DERIVATIVES->start(x) != OK) return FAILED;
     return s->peaks > 0 ? OPTIONAL.peaks->here(s, 1) : OK;
 }
 

@@ -32,6 +32,7 @@ Status instance_observe(Instance *x) {
     if (solver_observe(&x->solver, &x->seen) != OK) return FAILED;
     x->observed = 1;
     x->evaluated = 0;
+    if (DERIVATIVES != NULL) DERIVATIVES->observed(x);
     if (ERROR_BARS != NULL) x->bars->observed = 0;
     return OK;
 }
@@ -140,6 +141,7 @@ Status instance_get(Instance *x, const Variable *v, double *value) {
     if (!estimated && instance_was_set(x, v, value)) return OK;
     if (v->place == AT_ERROR) return ERROR_BARS->get(x, v, value);
     if (v->place == AT_INDICATOR) return indicator(x, v->index, value);
+    if (v->place == AT_SENSITIVITY || v->place == AT_SENSITIVITY_VALID) return DERIVATIVES->get(x, v, value);
     if (solver_arrive(&x->solver) != OK) return FAILED;
     if (follow(x) != OK) return FAILED;
     if (estimated && instance_was_set(x, v, value)) return OK;

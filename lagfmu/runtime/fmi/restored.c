@@ -16,6 +16,7 @@
 #include "indicators.h"
 #include "optional.h"
 #include "prescribed.h"
+#include "column.h"
 
 enum { MOST = INT_MAX / 2 }; /* of a count that is going to be increased, ... */
 static const double MOST_EVER = 1 / DBL_EPSILON; /* ... and of what a run does: 2^52, in ten thousand years */
@@ -27,7 +28,8 @@ enum { FLAG, COUNT, TALLY, SIZE, LIMIT, FINITE };
 /* How many of them there are; more than ONE stand behind a pointer. */
 enum {
     ONE, COORDINATES, SPEEDS, STATES, ROWS, CONTACTS, CONTACTS_COORDINATES, CONTACTS_SPEEDS, FRICTIONS,
-    FRICTIONS_COORDINATES, FRICTIONS_SPEEDS, INPUTS, SWITCH_STATES, PARAMETERS, PEAKS_KEPT, WATCHED, DENSE
+    FRICTIONS_COORDINATES, FRICTIONS_SPEEDS, INPUTS, SWITCH_STATES, PARAMETERS, PEAKS_KEPT, WATCHED, DENSE,
+    STEPPED, VARIATIONS, VARIED
 };
 
 typedef struct {
@@ -101,11 +103,13 @@ static const Saved OF_SOLVER[] = {
     LATEST("starts of sticking", STICKING, FRICTIONS),
     SOLVER("impulses", state.impulse, SIZE, CONTACTS),
     SOLVER("indicators", state.indicator, FINITE, WATCHED),
-    SOLVER("step ahead", integrator.y, FINITE, STATES),
-    SOLVER("step ahead", integrator.y_old, FINITE, STATES),
-    SOLVER("step ahead", integrator.f, FINITE, STATES),
-    SOLVER("step ahead", integrator.f_old, FINITE, STATES),
+    SOLVER("step ahead", integrator.y, FINITE, STEPPED),
+    SOLVER("step ahead", integrator.y_old, FINITE, STEPPED),
+    SOLVER("step ahead", integrator.f, FINITE, STEPPED),
+    SOLVER("step ahead", integrator.f_old, FINITE, STEPPED),
     SOLVER("step ahead", integrator.dense, FINITE, DENSE),
+    SOLVER("derivatives of the run", state.variation, FINITE, VARIATIONS),
+    SOLVER("derivatives of the run", state.varied, FLAG, VARIED),
     SOLVER("inputs", drive.value, FINITE, INPUTS),
     SOLVER("inputs", drive.first, FINITE, INPUTS),
     SOLVER("inputs", drive.second, FINITE, INPUTS),
@@ -171,7 +175,10 @@ static Status each(Instance *x, const Solver *s, const void *base, const Saved *
                         [PARAMETERS] = system->parameters,
                         [PEAKS_KEPT] = peaks_saved(s->peaks),
                         [WATCHED] = indicators_count(system),
-                        [DENSE] = now == NULL ? 0 : now->dense_arrays * (nq + nv)};
+                        [DENSE] = now == NULL ? 0 : now->dense_arrays * solver_width(s),
+                        [STEPPED] = solver_width(s),
+                        [VARIATIONS] = s->columns * column_size(system),
+                        [VARIED] = s->columns > 0};
     for (const Saved *row = list; row < list + rows; row++) {
         const void *where = (const char *)base + row->at;
         if (row->many != ONE) memcpy(&where, where, sizeof where);

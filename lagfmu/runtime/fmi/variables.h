@@ -4,7 +4,8 @@
 #define LAGFMU_VARIABLES_H
 
 #include "linkage.h"
-#include "state.h"
+#include "derivatives.h"
+#include "solver.h"
 
 typedef enum { TYPE_REAL, TYPE_INTEGER, TYPE_ENUMERATION, TYPE_BOOLEAN, TYPE_CLOCK } Type;
 
@@ -40,10 +41,12 @@ typedef enum {
     AT_TIME,
     AT_INDICATOR,      /* event indicator index */
     AT_CLOCK,          /* of contact, or after those friction, index */
+    AT_SENSITIVITY,    /* derivative of the variable at position `index` by what column `contact` is taken by */
+    AT_SENSITIVITY_VALID,
     AT_ERROR           /* error bar number `contact`, of the variable at position `index` (bars.h) */
 } Place;
 
-typedef struct {
+typedef struct Variable {
     const char *name;
     Type type;
     Role role;
@@ -67,6 +70,9 @@ SHARED const Variable *const VARIABLES; /* (VARIABLE_COUNT) */
 SHARED const int VARIABLE_COUNT;
 SHARED const Variable *const PEAKED; /* (PEAK_COUNT) quantities whose extremes are kept, read or not; or NULL */
 SHARED const int PEAK_COUNT;
+SHARED const Column *const COLUMNS; /* (COLUMN_COUNT) by what a run's derivatives are taken; or NULL */
+SHARED const int COLUMN_COUNT;
+SHARED const Derivatives *const DERIVATIVES; /* &OF_RUN (derivatives.h), or NULL */
 SHARED const System *const MODEL_SYSTEM;       /* the system that is stepped */
 SHARED const char *const MODEL_IDENTIFIER, *const MODEL_GUID;
 SHARED const double DEFAULT_TOLERANCE;

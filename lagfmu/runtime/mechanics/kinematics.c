@@ -114,9 +114,9 @@ static Status kinematics_settle(const Mechanism *b, double t, double *q, const d
 
 static void kinematics_change(const Mechanism *b, double t, const double *q, const double *v, const double *u,
                    const double *p, double dt, const double *dq, const double *dv, const double *du,
-                   double *dB, double *changed) {
+                   const double *dp, double *dB, double *changed) {
     const System *s = b->system;
-    s->kinematics_tangent(t, q, u, p, dt, dq, du, dB, changed);
+    s->kinematics_tangent(t, q, u, p, dt, dq, du, dp, dB, changed);
     kinematics_move(b, 1, dv, changed);
     for (int e = 0; e < s->rates; e++) changed[s->rate_row[e]] += dB[e] * v[s->rate_column[e]];
 }

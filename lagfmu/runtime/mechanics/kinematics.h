@@ -23,10 +23,10 @@ typedef struct {
     /* Unit quaternions of norm 1, and angles within pi of what they equal modulo 2 pi.  FAILED: a quaternion of
      * norm 0, or one of these that is not finite. */
     Status (*settle)(const struct Mechanism *b, double t, double *q, const double *u, const double *p);
-    /* change (nq) of B v + b along (dt, dq, dv, du); dB (rates): scratch. */
+    /* change (nq) of B v + b along (dt, dq, dv, du, dp); dB (rates): scratch. */
     void (*change)(const struct Mechanism *b, double t, const double *q, const double *v, const double *u,
                    const double *p, double dt, const double *dq, const double *dv, const double *du,
-                   double *dB, double *change);
+                   const double *dp, double *dB, double *change);
 } Kinematics;
 
 /* NULL in an FMU whose speeds all are rates of coordinates: its optional.c says so, and kinematics.c is not there. */

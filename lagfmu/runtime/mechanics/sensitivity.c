@@ -34,6 +34,8 @@ void sensitivity_layout(Sensitivity *w, Arena *arena, const System *s) {
     w->dq = arena_doubles(arena, s->nq);
     w->dv = arena_doubles(arena, s->nv);
     w->du = arena_doubles(arena, s->inputs);
+    w->dp = arena_doubles(arena, s->parameters);
+    for (int k = 0; k < s->parameters && w->dp != NULL; k++) w->dp[k] = 0;
     w->dforce = arena_doubles(arena, s->nv);
     w->known = arena_doubles(arena, s->m);
     w->on_vdot = arena_doubles(arena, s->nv);
@@ -62,10 +64,11 @@ static void right_sides(Sensitivity *w, const Mechanism *b) {
 
 Status sensitivity_sides(Sensitivity *w, Mechanism *b, Instant at, const double *q, const double *v, Direction d) {
     const System *s = b->system;
-    s->tangent(at.t, q, v, at.u, at.p, d.dt, d.dq, d.dv, d.du, w->dM, w->dF, w->dG, w->dnu,
+    s->tangent(at.t, q, v, at.u, at.p, d.dt, d.dq, d.dv, d.du, d.dp, w->dM, w->dF, w->dG, w->dnu,
                w->dgamma, w->df, w->denergy);
     if (s->kinematics != NULL)
-        KINEMATICS->change(b, at.t, q, v, at.u, at.p, d.dt, d.dq, d.dv, d.du, w->dB, w->drate);
+        KINEMATICS->change(b, at.t, q, v, at.u, at.p, d.dt, d.dq, d.dv, d.du, d.dp, w->dB,
+                           w->drate);
     else
         memcpy(w->drate, d.dv, (size_t)s->nq * sizeof *w->drate);
     right_sides(w, b);
@@ -108,7 +111,7 @@ Status sensitivity_adjoint(Sensitivity *w, Mechanism *b) {
 void sensitivity_of_energies(Sensitivity *w, const System *s, Instant at, const double *q,
                              const double *v, Direction d) {
     if (s->tangent == NULL) return;
-    s->tangent(at.t, q, v, at.u, at.p, d.dt, d.dq, d.dv, d.du, w->dM, w->dF, w->dG, w->dnu,
+    s->tangent(at.t, q, v, at.u, at.p, d.dt, d.dq, d.dv, d.du, d.dp, w->dM, w->dF, w->dG, w->dnu,
                w->dgamma, w->df, w->denergy);
 }
 
@@ -128,7 +131,7 @@ Status sensitivity_jacobian(Sensitivity *w, Mechanism *b, Instant at, const int 
                             const double *y, double *J, double *dfdt) {
     const int nq = b->system->nq, nv = b->system->nv, ny = system_states(b->system);
     const double *q = y, *v = y + nq;
-    Direction d = {0, w->dq, w->dv, w->du};
+    Direction d = {0, w->dq, w->dv, w->du, w->dp};
     if (mechanism_motion(b, at, q, v, active) != OK) return FAILED;
     memset(w->dq, 0, (size_t)nq * sizeof *w->dq);
     memset(w->dv, 0, (size_t)nv * sizeof *w->dv);

@@ -6,10 +6,10 @@
 #include "linkage.h"
 #include "mechanism.h"
 
-/* A direction: the change of time, coordinates (nq), speeds (nv) and inputs. */
+/* A direction: the change of time, coordinates (nq), speeds (nv), inputs and parameters. */
 typedef struct {
     double dt;
-    const double *dq, *dv, *du;
+    const double *dq, *dv, *du, *dp;
 } Direction;
 
 /* The changes along it, and the memory that is needed to find them. */
@@ -19,6 +19,7 @@ typedef struct {
     double *dB, *drate;      /* (rates), (nq) of q' = B v + b */
     double *b, *c;           /* (nv), (m) right sides */
     double *dq, *dv, *du;    /* (nq), (nv), (inputs): a direction, for whoever asks */
+    double *dp;              /* (parameters) 0, but where a run's derivatives are taken */
     double *dforce;          /* (nv) change of Q */
     double *down, *dother;   /* (output_count) changes of these */
     double *known;           /* (m) dlambda where it is unique, no numbers elsewhere */

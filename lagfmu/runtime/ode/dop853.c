@@ -144,13 +144,13 @@ static Status dop853_stages(const Integrator *i, const Ode *ode, double h, doubl
 /* The error in units of the tolerance; not a number if y1 is not finite. */
 static double error_norm(const Integrator *i, const Control *control, double h, const double *k,
                          const double *RESTRICT y1, const double *RESTRICT sum) {
-    const int n = i->ny;
+    const int n = i->ny, watched = i->watched;
     const double tolerance = step_size_tolerance(control);
     const double *RESTRICT y = i->y, *RESTRICT scale = control->scale, *RESTRICT k1 = i->f;
     const double *k6 = k + 4 * n, *k7 = k6 + n, *k8 = k7 + n, *k9 = k8 + n, *k10 = k9 + n;
     const double *k11 = k10 + n, *k12 = k11 + n;
     double square5 = 0, square3 = 0;
-    for (int j = 0; j < n; j++) {
+    for (int j = 0; j < watched; j++) {
         double fifth = e1 * k1[j] + e6 * k6[j] + e7 * k7[j] + e8 * k8[j] + e9 * k9[j] +
                        e10 * k10[j] + e11 * k11[j] + e12 * k12[j];
         double third = sum[j] - bh1 * k1[j] - bh9 * k9[j] - bh12 * k12[j];
@@ -161,7 +161,7 @@ static double error_norm(const Integrator *i, const Control *control, double h, 
         square3 += third * third;
     }
     double denominator = square5 + 0.01 * square3;
-    return denominator == 0 ? 0 : square5 / sqrt(denominator * n);
+    return denominator == 0 ? 0 : square5 / sqrt(denominator * watched);
 }
 
 /* h_new / h = 0.9 err^(-1/8), within limits (eq. II.4.13). */

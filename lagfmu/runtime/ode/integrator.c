@@ -1,7 +1,7 @@
 /* integrator.c -- memory of the integrators, and putting one at a state. */
 #include "integrator.h"
 
-void integrator_layout(Integrator *i, Arena *saved, Arena *scratch, int ny,
+void integrator_layout(Integrator *i, Arena *saved, Arena *scratch, int ny, int watched,
                        const Method *const *methods, int count) {
     int dense = 0, doubles = 0, ints = 0;
     for (int k = 0; k < count; k++) {
@@ -14,6 +14,7 @@ void integrator_layout(Integrator *i, Arena *saved, Arena *scratch, int ny,
         if (pivots > ints) ints = pivots;
     }
     i->ny = ny;
+    i->watched = watched;
     i->y = arena_doubles(saved, ny);
     i->f = arena_doubles(saved, ny);
     i->y_old = arena_doubles(saved, ny);

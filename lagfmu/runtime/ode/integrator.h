@@ -22,7 +22,7 @@ typedef struct {
 
 typedef struct {
     double tolerance;      /* relative, per step */
-    const double *scale;   /* (ny) magnitudes below which errors are measured absolutely */
+    const double *scale;   /* (watched) magnitudes below which errors are measured absolutely */
     double maximum_step;   /* [s]; 0: no limit */
     double fixed_step;     /* [s]; of rk4 and rattle */
 } Control;
@@ -33,7 +33,7 @@ typedef struct Method Method;
  * `scratch` holds nothing from one call to the next. */
 typedef struct {
     const Method *method;
-    int ny;
+    int ny, watched;   /* components, and how many of them, the first, control the step */
     double t_old, t;   /* the step just taken went from t_old to t */
     double h_next;     /* the step to try next; 0: to be chosen from the problem */
     double error_old;  /* memory of the step-size controller */
@@ -76,7 +76,7 @@ SHARED double rk4_error(const Integrator *i, int component);
 
 /* Takes memory for any of `count` methods (NULL: none) from the arena.  The arrays that must be saved (y, f, y_old,
  * f_old, dense) come from `saved`, the scratch from `scratch`. */
-SHARED void integrator_layout(Integrator *i, Arena *saved, Arena *scratch, int ny,
+SHARED void integrator_layout(Integrator *i, Arena *saved, Arena *scratch, int ny, int watched,
                               const Method *const *methods, int count);
 
 /* Puts the integrator at (t, y); h: step to try first, 0: to be chosen. */

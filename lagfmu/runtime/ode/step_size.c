@@ -40,12 +40,12 @@ Status step_size_rate(Integrator *i, const Ode *ode) {
 /* |x| in units of tolerance * max(|y|, scale), root-mean-square; the largest where squares are beyond a double. */
 static double weighted_norm(const Integrator *i, const Control *control, const double *x) {
     double tolerance = step_size_tolerance(control), sum = 0, largest = 0;
-    for (int j = 0; j < i->ny; j++) {
+    for (int j = 0; j < i->watched; j++) {
         double ratio = x[j] / step_size_weight(tolerance, i->y[j], 0, control->scale[j]);
         sum += ratio * ratio;
         largest = fmax(largest, fabs(ratio));
     }
-    return sum < HUGE_VAL ? sqrt(sum / i->ny) : largest;
+    return sum < HUGE_VAL ? sqrt(sum / i->watched) : largest;
 }
 
 /* |f(t + h, y + h f) - f(t, y)| / h, an estimate of the second derivative; h is made smaller until

@@ -13,6 +13,7 @@
 #include "nominals.h"
 #include "optional.h"
 #include "segment.h"
+#include "column.h"
 
 enum { CHATTER = 200 };             /* events in next to no time after which the step is given up, ... */
 static const double AT_ONCE = 1e-9; /* ... natural times that are next to none */
@@ -64,6 +65,7 @@ static Status set_out(Solver *s) {
     State *x = &s->state;
     double *y = s->work_advance;
     state_gather(s->system, x->q, x->v, y);
+    if (s->columns > 0) columns_gather(s, y);
     if (stiffness_turn(&x->now.choice)) x->now.step = x->now.choice.longest;
     restart(s, x->now.t, y, x->now.step);
     x->now.ahead = 1;
@@ -168,6 +170,7 @@ static Status take_step(Solver *s, double t_end) {
 
 static void put(Solver *s, double t, const double *y) {
     state_scatter(s->system, y, s->state.q, s->state.v);
+    if (s->columns > 0) columns_scatter(s, y);
     s->state.now.t = t;
     s->state.now.between = 0;
 }
@@ -245,6 +248,15 @@ static Status arrive(Solver *s, double t_end) {
     return OK;
 }
 
+/* What the event that has come does to the modes. */
+static Status switch_modes(Solver *s, void *context, int c, double part) {
+    (void)context;
+    (void)c;
+    (void)part;
+    if (s->system->switches > 0) OPTIONAL.switches->pass(s, s->state.left + s->system->contacts);
+    return s->system->contacts + s->system->frictions > 0 ? OPTIONAL.modes_switch(s, s->state.left) : OK;
+}
+
 /* The event in the step just taken: the state there, in the modes before it. */
 static Status reach_event(Solver *s) {
     Integrator *i = &s->integrator;
@@ -270,9 +282,8 @@ Status solver_meet(Solver *s) {
     if (!s->state.now.pending) return OK;
     s->state.now.pending = 0;
     segment_begin(s);
-    if (s->system->switches > 0) OPTIONAL.switches->pass(s, s->state.left + s->system->contacts);
-    if (s->system->contacts + s->system->frictions > 0 && OPTIONAL.modes_switch(s, s->state.left) != OK)
-        return FAILED;
+    const Status switched = s->columns > 0 ? OPTIONAL.variation->pass(s, switch_modes) : switch_modes(s, NULL, 0, 0);
+    if (switched != OK) return FAILED;
     return s->peaks > 0 ? OPTIONAL.peaks->here(s, 0) : OK;
 }
 
@@ -332,10 +343,12 @@ static void pause_there(Solver *s, double *t_end) {
     double *y = s->work_pause;
     if (s->pause == NULL || x->now.event_count > 0 || !(i->t < *t_end)) return;
     state_gather(s->system, x->q, x->v, y);
+    if (s->columns > 0) columns_gather(s, y);
     put(s, i->t, i->y);
     x->now.lost = kept.lost_ahead;
     s->pause(s->caller, t_end);
     state_scatter(s->system, y, x->q, x->v);
+    if (s->columns > 0) columns_scatter(s, y);
     x->now = kept;
     segment_begin(s);
 }

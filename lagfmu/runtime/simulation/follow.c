@@ -33,8 +33,11 @@ static Status follow_switches(Solver *s, int *changed) {
     return OK;
 }
 
-Status solver_follow(Solver *s) {
+static Status follow_inputs(Solver *s, void *context, int c, double part) {
     int changed;
+    (void)context;
+    (void)c;
+    (void)part;
     if (!s->state.now.ahead && s->system->switches > 0)
         OPTIONAL.switches->settle(s, segment_instant(s, s->state.now.t), s->state.q, s->state.v, NULL, NULL);
     if (s->system->prescribed_count > 0 && carry(s) != OK) return FAILED;
@@ -44,9 +47,14 @@ Status solver_follow(Solver *s) {
     return changed ? follow_contacts(s) : OK;
 }
 
+Status solver_follow(Solver *s) {
+    return s->columns > 0 && s->drive.turned ? OPTIONAL.variation->jump(s, follow_inputs)
+                                             : follow_inputs(s, NULL, 0, 0);
+}
+
 Status solver_look(Solver *s) {
     s->state.looking = 1;
-    const Status status = solver_follow(s);
+    const Status status = follow_inputs(s, NULL, 0, 0);
     s->state.looking = 0;
     return status;
 }

@@ -7,8 +7,12 @@
 #include "minimum_gap.h"
 #include "optional.h"
 #include "outputs.h"
+#include "column.h"
 
-static void state_layout(State *x, Integrator *i, Arena *saved, Arena *scratch, const System *s) {
+static void state_layout(Solver *solver, Arena *saved, Arena *scratch) {
+    State *x = &solver->state;
+    Integrator *i = &solver->integrator;
+    const System *s = solver->system;
     const int nq = s->nq, nv = s->nv, contacts = s->contacts, indicators = indicators_count(s);
     const size_t begin = saved->used;
     x->block = saved->base == NULL ? NULL : saved->base + begin;
@@ -34,7 +38,9 @@ static void state_layout(State *x, Integrator *i, Arena *saved, Arena *scratch, 
     x->impulse = arena_doubles(saved, contacts);
     x->stick_slip = arena_take(saved, (size_t)s->frictions, sizeof *x->stick_slip);
     x->indicator = arena_doubles(saved, indicators);
-    integrator_layout(i, saved, scratch, nq + nv, OPTIONAL.methods, METHOD_COUNT);
+    x->variation = arena_doubles(saved, solver->columns * column_size(s));
+    x->varied = arena_ints(saved, solver->columns > 0);
+    integrator_layout(i, saved, scratch, solver_width(solver), nq + nv, OPTIONAL.methods, METHOD_COUNT);
     x->block_size = saved->used - begin;
 }
 
@@ -43,13 +49,14 @@ void solver_layout(Solver *s, Arena *saved, Arena *scratch, const System *system
     const int m = system->m, contacts = system->contacts;
     const int indicators = indicators_count(system);
     s->system = system;
-    state_layout(&s->state, &s->integrator, saved, scratch, system);
+    const int width = solver_width(s);
+    state_layout(s, saved, scratch);
     s->drive.value = arena_doubles(saved, system->inputs);
     s->drive.first = arena_doubles(saved, system->inputs);
     s->drive.second = arena_doubles(saved, system->inputs);
     s->p = arena_doubles(saved, system->parameters);
     s->peak = arena_doubles(saved, peaks_saved(s->peaks));
-    integrator_layout(&s->probe, scratch, scratch, states, OPTIONAL.methods, METHOD_COUNT);
+    integrator_layout(&s->probe, scratch, scratch, width, states, OPTIONAL.methods, METHOD_COUNT);
     mechanism_layout(&s->stepped, scratch, system, &s->why,
                      OPTIONAL.friction != NULL ? OPTIONAL.friction->sliding : NULL);
     if (s->stepped.friction != NULL) s->stepped.friction->stick_slip = s->state.stick_slip;
@@ -69,21 +76,22 @@ void solver_layout(Solver *s, Arena *saved, Arena *scratch, const System *system
     s->iwork_initial = arena_ints(scratch, 2 * m + contacts);
     s->work_contacts = arena_doubles(scratch, 2 * nv + 3 * m);
     s->iwork_contacts = arena_ints(scratch, m + 2 * contacts);
-    s->work_passage = arena_doubles(scratch, OPTIONAL.passage != NULL ? states : 0);
-    s->work_advance = arena_doubles(scratch, 2 * states);
-    s->work_pause = arena_doubles(scratch, states);
-    s->work_events = arena_doubles(scratch, 3 * states + indicators +
+    s->work_passage = arena_doubles(scratch, OPTIONAL.passage != NULL ? width : 0);
+    s->work_advance = arena_doubles(scratch, 2 * width);
+    s->work_pause = arena_doubles(scratch, width);
+    s->work_events = arena_doubles(scratch, 3 * width + indicators +
                                                 (indicators == 0 ? 0 : event_search_doubles(indicators)));
     if (s->peaks > 0) {
         observed_layout(&s->peak_seen, scratch, system);
-        s->work_peaks = arena_doubles(scratch, OPTIONAL.peaks->doubles(s->peaks, states));
+        s->work_peaks = arena_doubles(scratch, OPTIONAL.peaks->doubles(s->peaks, width));
     }
     s->work_gap = arena_doubles(scratch, minimum_gap_doubles(system));
+    if (s->columns > 0) OPTIONAL.variation->layout(s, scratch);
     const int frictions = system->frictions, some = frictions > 0;
     s->work_frictional = arena_take(scratch, some ? OPTIONAL.friction->doubles(system) : 0, sizeof(double));
     s->iwork_frictional = arena_take(scratch, some ? OPTIONAL.friction->ints(system) : 0, sizeof(int));
     s->trial_modes = arena_take(scratch, (size_t)frictions, sizeof *s->trial_modes);
-    s->work_friction = arena_doubles(scratch, some * (2 * frictions + 3 * states));
+    s->work_friction = arena_doubles(scratch, some * (2 * frictions + 3 * width));
     s->iwork_friction = arena_ints(scratch, some * (4 * frictions + 2 * contacts));
     s->iwork_events = arena_ints(scratch, 6 * contacts);
     s->work_modes = arena_doubles(scratch, contacts == 0 && frictions == 0 ? 0 : m + nv);

@@ -32,10 +32,10 @@ static const Interval *bound_rates(Solver *s, double a, double b, double *y) {
     double *u = s->work_gap;
     Interval *q = (Interval *)(void *)(u + 3 * driven), *w = q + states, *rate = w + driven;
     for (int k = 0; k < 3; k++) {
-        i->method->dense(i, t[k], y + k * states);
+        i->method->dense(i, t[k], y + k * i->ny);
         segment_inputs(s, t[k], u + k * driven);
     }
-    for (int j = 0; j < states; j++) q[j] = box(y[j], y[states + j], y[2 * states + j]);
+    for (int j = 0; j < states; j++) q[j] = box(y[j], y[i->ny + j], y[2 * i->ny + j]);
     for (int j = 0; j < inputs; j++) w[j] = box(u[j], u[driven + j], u[2 * driven + j]);
     for (int j = inputs; j < driven; j++) w[j] = interval_of(s->state.switch_state[j - inputs]);
     system->bounds((Interval){a, b}, q, q + nq, w, s->p, rate);

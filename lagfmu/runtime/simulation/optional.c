@@ -20,4 +20,5 @@ SHARED_VALUE const Optional OPTIONAL = {
     .peaks = &PEAKS,
     .passage = &PASSAGE,
     .friction = &FRICTION_EVENTS,
+    .variation = &VARIATION,
 };

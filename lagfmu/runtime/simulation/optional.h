@@ -15,6 +15,7 @@
 #include "rattle.h"
 #include "friction_events.h"
 #include "modes.h"
+#include "variation.h"
 
 typedef struct {
     /* Integrators by MethodName, that of AUTO being the explicit one; NULL where it is left out. */
@@ -41,6 +42,8 @@ typedef struct {
     const Passage *passage;
     /* What constraints that hold by friction need; NULL where there are none. */
     const FrictionEvents *friction;
+    /* Of a run's derivatives; NULL where none are asked for. */
+    const Variation *variation;
 } Optional;
 
 SHARED const Optional OPTIONAL;

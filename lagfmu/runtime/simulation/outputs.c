@@ -96,7 +96,7 @@ void outputs_unique(Mechanism *b, Instant at, Observed *o) {
 static void change_unique(Sensitivity *w, const System *s, Instant at, const Observed *o, Direction d) {
     double *down = o->work_unique, *other = down + s->output_count;
     s->outputs_tangent(at.t, o->q, o->v, at.u, at.p, o->vdot, o->lambda, o->force, d.dt, d.dq, d.dv,
-                       d.du, w->dvdot, w->dlambda, w->dforce, down, other);
+                       d.du, d.dp, w->dvdot, w->dlambda, w->dforce, down, other);
     for (int i = 0; i < s->unique_count; i++) {
         const int j = s->unique_output[i];
         if (!o->own_unique[i]) continue;
@@ -114,7 +114,7 @@ void outputs_change(Sensitivity *w, const Mechanism *b, const System *s, Instant
     /* the values tell which of a guarded output's two expressions holds: */
     s->outputs(at.t, o->q, o->v, at.u, at.p, o->vdot, o->lambda, o->force, o->own, o->other);
     s->outputs_tangent(at.t, o->q, o->v, at.u, at.p, o->vdot, o->lambda, o->force, d.dt, d.dq, d.dv,
-                       d.du, w->dvdot, w->known, w->dforce, w->down, w->dother);
+                       d.du, d.dp, w->dvdot, w->known, w->dforce, w->down, w->dother);
     if (b != NULL && s->unique_count > 0) change_unique(w, s, at, o, d);
     for (int i = 0; i < s->output_count; i++) {
         if (isfinite(o->own[i]) || !s->guarded[i]) continue;
@@ -126,8 +126,8 @@ void outputs_change(Sensitivity *w, const Mechanism *b, const System *s, Instant
 /* The weighted change along what of w stands for it. */
 static double weigh(Sensitivity *w, const System *s, Instant at, const Observed *o, const double *weight) {
     double sum = 0;
-    s->outputs_tangent(at.t, o->q, o->v, at.u, at.p, o->vdot, o->lambda, o->force, 0, w->dq, w->dv, w->du, w->dvdot,
-                       w->dlambda, w->dforce, w->down, w->dother);
+    s->outputs_tangent(at.t, o->q, o->v, at.u, at.p, o->vdot, o->lambda, o->force, 0, w->dq, w->dv, w->du, w->dp,
+                       w->dvdot, w->dlambda, w->dforce, w->down, w->dother);
     for (int i = 0; i < s->output_count; i++)
         if (weight[i] != 0) sum += weight[i] * (isfinite(o->own[i]) || !s->guarded[i] ? w->down[i] : w->dother[i]);
     return sum;

@@ -109,7 +109,7 @@ static int landed(const Solver *s, double *h) {
 }
 
 static const double *stage(Solver *s, double t, const double *y) {
-    memcpy(s->work_passage, y, (size_t)system_states(s->system) * sizeof *y);
+    memcpy(s->work_passage, y, (size_t)solver_width(s) * sizeof *y);
     return segment_project(s, t, s->work_passage) == OK ? s->work_passage : NULL;
 }
 

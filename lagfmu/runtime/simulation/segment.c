@@ -73,13 +73,14 @@ static Status rate_of_state(void *context, double t, const double *y, double *dy
     Solver *s = context;
     const int nq = s->system->nq, nv = s->system->nv;
     if (s->state.now.approach.near && (y = OPTIONAL.passage->stage(s, t, y)) == NULL) return FAILED;
-    s->stepped.stage = 1;
+    s->stepped.stage = s->columns == 0;
     const Status status = segment_motion(s, segment_instant(s, t), y, y + nq);
     s->stepped.stage = 0;
     if (status != OK) return FAILED;
     if (OPTIONAL.passage != NULL) s->narrowest = fmin(s->narrowest, s->apart = linear_apart(&s->stepped.linear));
     find_rates(s, y, dydt);
     for (int i = 0; i < nv; i++) dydt[nq + i] = s->stepped.vdot[i];
+    if (s->columns > 0) OPTIONAL.variation->rates(s, t, y, dydt + nq + nv);
     return OK;
 }
 
@@ -96,7 +97,7 @@ static Status plain_rate(void *context, double t, const double *y, double *dydt)
 
 static int is_plain(const Solver *s) {
     const int *rows = solver_rows(s);
-    if (s->system->accelerate == NULL || s->system->frictions > 0) return 0;
+    if (s->system->accelerate == NULL || s->system->frictions > 0 || s->columns > 0) return 0;
     for (int k = 0; k < s->system->m; k++)
         if (!rows[k]) return 0;
     return 1;
@@ -165,6 +166,7 @@ static Status accept(Solver *s, Integrator *i) {
     if (!kept && mechanism_motion(&s->stepped, at, y, y + nq, s->active) != OK) return FAILED;
     mechanism_rates(&s->stepped, y + nq, i->f);
     memcpy(i->f + nq, s->stepped.vdot, (size_t)nv * sizeof *y);
+    if (s->columns > 0) OPTIONAL.variation->rates(s, i->t, y, i->f + nq + nv);
     i->fresh = 0;
     if (!kept) segment_choose_rows(s);
     if (OPTIONAL.passage != NULL) OPTIONAL.passage->look(s, i->t, y); /* evaluates elsewhere */
@@ -196,8 +198,10 @@ Status segment_prepare_dense(Solver *s, Integrator *i) {
 }
 
 Status segment_project(Solver *s, double t, double *y) {
-    return mechanism_project(&s->stepped, segment_instant(s, t), y, y + s->system->nq, s->active,
-                             s->state.offset, s->state.span);
+    const Instant at = segment_instant(s, t);
+    if (mechanism_project(&s->stepped, at, y, y + s->system->nq, s->active, s->state.offset, s->state.span) != OK)
+        return FAILED;
+    return s->columns == 0 ? OK : OPTIONAL.variation->project(s, at, y);
 }
 
 /* What rounding of the force on speed i makes of its acceleration. */
@@ -246,11 +250,12 @@ Status segment_check_projection(Solver *s, double t, const double *y, const doub
 
 Status segment_reach(Solver *s, double t0, const double *y0, double t1, double *y) {
     Integrator *i = &s->probe;
-    memcpy(y, y0, (size_t)system_states(s->system) * sizeof *y);
+    const size_t bytes = (size_t)i->ny * sizeof *y;
+    memcpy(y, y0, bytes);
     if (!(t1 > t0)) return OK;
     integrator_start(i, s->integrator.method, t0, y0, t1 - t0);
     while (i->t < t1)
         if (segment_step(s, i, t1, HUGE_VAL) != OK) return FAILED;
-    memcpy(y, i->y, (size_t)system_states(s->system) * sizeof *y);
+    memcpy(y, i->y, bytes);
     return segment_project(s, t1, y);
 }

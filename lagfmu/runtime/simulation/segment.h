@@ -46,7 +46,7 @@ SHARED Status segment_rate(Solver *s, Integrator *i);
 /* Completes the dense output of the step just taken. */
 SHARED Status segment_prepare_dense(Solver *s, Integrator *i);
 
-/* y (states) moved onto the constraints. */
+/* y (solver_width()) moved onto the constraints. */
 SHARED Status segment_project(Solver *s, double t, double *y);
 
 /* FAILED if the projection after an adaptive step moved the state by far more than the step's error

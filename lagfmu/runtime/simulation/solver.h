@@ -30,6 +30,12 @@ typedef struct {
     int *sticks;                   /* (frictions) */
 } Observed;
 
+/* By what a column of a run's derivatives is taken: p[parameter], or the start value of `state`; the other is -1. */
+typedef struct {
+    const char *name;
+    int parameter, state;
+} Column;
+
 typedef struct Solver {
     const System *system;
     Settings settings;
@@ -58,6 +64,9 @@ typedef struct Solver {
     int peaks;                 /* how many quantities' extremes are kept (peaks.h); set before the layout */
     Status (*measure)(struct Solver *s, const Observed *o, double *values); /* (peaks) of them at a state */
     double *peak;              /* what is kept of them, saved behind the state's arrays */
+    int columns;               /* how many columns of derivatives go with the state (variation.h), and ... */
+    const Column *column;      /* (columns) ... by what; both are set before the layout */
+    struct Saltation *saltation; /* of saltation.c; NULL without columns */
     double *push;              /* (contacts) impulse of the impacts of the present instant [of lambda times s] */
     /* scratch, nothing of which is kept from one call to the next: */
     int *active_full;          /* (m of full) rows that act there */
@@ -67,17 +76,17 @@ typedef struct Solver {
     int *iwork_contacts;       /* (m + 2 contacts) */
     double *work_switches;     /* (2 switches + states + nq) of switches.c */
     double apart, narrowest;   /* linear_apart() at the latest stage, and the least of a step */
-    double *work_passage;      /* (states) of passage.c */
-    double *work_advance;      /* (2 states) of advance.c and exchange.c */
-    double *work_pause;        /* (states) */
-    double *work_events;       /* (3 states + indicators and all samples) of events.c and exchange_gain.c */
+    double *work_passage;      /* (solver_width()) of passage.c */
+    double *work_advance;      /* (2 solver_width()) of advance.c and exchange.c */
+    double *work_pause;        /* (solver_width()) */
+    double *work_events;       /* (3 solver_width() + indicators and all samples) of events.c and exchange_gain.c */
     double *work_gap;    /* of minimum_gap.c */
     Observed peak_seen;        /* of peaks.c, with */
     double *work_peaks;
     double *work_frictional;   /* of frictional_impact.c */
     int *iwork_frictional;
     StickSlip *trial_modes;    /* (frictions) of stick_slip.c, with */
-    double *work_friction;     /* (2 frictions + 3 states) */
+    double *work_friction;     /* (2 frictions + 3 solver_width()) */
     int *iwork_friction;       /* (4 frictions + 2 contacts) */
     int *iwork_events;         /* (6 contacts) of events.c and modes.c */
     double *work_modes;        /* (m + nv) of modes.c */
@@ -86,6 +95,9 @@ typedef struct Solver {
     Why passed;                /* singular configurations passed since the caller emptied it, as a sentence */
     Why why;
 } Solver;
+
+/* What is integrated: the state, and the columns of its derivatives. */
+static inline int solver_width(const Solver *s) { return system_states(s->system) * (1 + s->columns); }
 
 /* (m) The rows for states off the constraints: those that act, as many of them as are independent. */
 static inline const int *solver_rows(const Solver *s) {

@@ -95,6 +95,8 @@ typedef struct {
     Latest latest[EVENT_KINDS]; /* of each contact, or friction */
     double *impulse;          /* (contacts) [of lambda times s] of the latest closing; 0: none */
     StickSlip *stick_slip;    /* (frictions) how they stand */
+    double *variation;        /* (columns * column_size()) derivatives of all that is differentiable here */
+    int *varied;              /* one, where there are columns: 1 while they exist */
     double *indicator;        /* (indicators) their values at the integrator's time, when it is ahead */
     char *block;              /* all of the arrays above */
     size_t block_size;

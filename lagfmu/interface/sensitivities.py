@@ -1,0 +1,45 @@
+"""OUTPUT:PARAMETER,... of a scene -> of what derivatives are taken, and by what."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from .. import names
+from ..model.selection import listed, select
+from .variables import Variable
+
+NOT_DIFFERENTIATED = (names.RESIDUAL, names.ERROR, names.STEPS, *names.COUNTS, *names.PEAKS)
+
+
+def differentiated(
+    variables: Sequence[Variable], asked: Sequence[str], problems: list[str]
+) -> list[tuple[Variable, Variable]]:
+    """Each output with a parameter or start value by which its derivative is asked for, by these in order.
+
+    What names nothing is added to `problems`.
+    """
+    of = {v.name: v for v in variables if _is_differentiable(v)}
+    by = {v.name: v for v in variables if v.role in ("parameter", "start")}
+    pairs: set[tuple[str, str]] = set()
+    for text in asked:
+        outputs, _, numbers = text.partition(":")
+        rows = select(listed(outputs), list(of), "sensitivities: the output", problems)
+        columns = select(
+            listed(numbers), list(by), "sensitivities: the parameter or start value", problems
+        )
+        pairs |= {(row, column) for row in rows for column in columns}
+    return [(of[a], by[b]) for b in by for a in of if (a, b) in pairs]
+
+
+def named(asked: Sequence[str]) -> set[str]:
+    """The parameters and start values that are named, not meant by a pattern."""
+    found = {number for text in asked for number in listed(text.partition(":")[2])}
+    return {number for number in found if not {"*", "?"} & set(number)}
+
+
+def _is_differentiable(v: Variable) -> bool:
+    """What is reported of the motion, and of its events."""
+    if v.of.quantity == names.DISSIPATED and v.variability == "continuous":
+        return False  # the work of frictions is summed up, not integrated
+    calculated = v.role in ("output", "start") and v.kind == "Real"
+    return calculated and v.of.quantity not in NOT_DIFFERENTIATED

@@ -1,0 +1,174 @@
+/* variation.c -- derivatives of the motion between two events: the variational equations
+ *
+ *   S' = phi_y S + phi_p
+ *
+ * of the index-1 equations y' = phi(t, y, p) (Hairer, Norsett & Wanner I, sect. I.14), which the integrator steps
+ * beside the state under the state's own error control: a step of S is the derivative of the step of y.  After each
+ * step S is moved onto the tangents of the constraints, in the metric of M as the state itself,
+ *
+ *   f_q S_q + f_p = offset_p ,   G S_v = nu' - G' v        (' along S and p).
+ *
+ * Where a friction slips its force is differentiated by central differences, all else by the tangents. */
+#include "variation.h"
+
+#include <math.h>
+
+#include "friction.h"
+#include "nominals.h"
+#include "segment.h"
+
+static const double SLIPPING_STEP = 0x1p-17; /* of what y and p are large: cube root of a double's rounding */
+
+/* ------------------------------------------------------------------ rates */
+
+/* By the tangents, of the latest motion. */
+static Status rates_along(Solver *s, Instant at, const double *y, const double *S, int parameter, double *rates) {
+    const System *system = s->system;
+    Sensitivity *w = &s->sensitivity;
+    const Direction d = {0, S, S + system->nq, w->du, w->dp};
+    memset(w->du, 0, (size_t)system->inputs * sizeof *w->du);
+    if (parameter >= 0) w->dp[parameter] = 1;
+    const Status status = sensitivity_along(w, &s->stepped, at, y, y + system->nq, d);
+    if (parameter >= 0) w->dp[parameter] = 0;
+    memcpy(rates, w->drate, (size_t)system->nq * sizeof *rates);
+    memcpy(rates + system->nq, w->dvdot, (size_t)system->nv * sizeof *rates);
+    return status;
+}
+
+/* Adds weight y' at y + part S, p + part. */
+static Status add_rates(Solver *s, double t, const double *y, const double *S, int parameter, double part,
+                        double weight, double *rates) {
+    const int n = system_states(s->system), nq = s->system->nq;
+    double *there = s->work_friction + 2 * s->system->frictions, *rate = there + n;
+    const double held = parameter < 0 ? 0 : s->p[parameter];
+    for (int j = 0; j < n; j++) there[j] = y[j] + part * S[j];
+    if (parameter >= 0) s->p[parameter] = held + part;
+    s->stepped.stage = 1;
+    const Status status = segment_motion(s, segment_instant(s, t), there, there + nq);
+    s->stepped.stage = 0;
+    if (parameter >= 0) s->p[parameter] = held;
+    if (status != OK) return FAILED;
+    mechanism_rates(&s->stepped, there + nq, rate);
+    memcpy(rate + nq, s->stepped.vdot, (size_t)s->system->nv * sizeof *rate);
+    for (int j = 0; j < n; j++) rates[j] += weight * rate[j];
+    return OK;
+}
+
+static Status rates_by_differences(Solver *s, double t, const double *y, const double *S, int parameter,
+                                   double *rates) {
+    const int n = system_states(s->system);
+    double most = parameter >= 0 ? 1 / (s->p[parameter] != 0 ? fabs(s->p[parameter]) : 1) : 0;
+    memset(rates, 0, (size_t)n * sizeof *rates);
+    for (int j = 0; j < n; j++) {
+        const double size = fmax(fabs(y[j]), nominals_natural(s, j));
+        if (size > 0) most = fmax(most, fabs(S[j]) / size);
+    }
+    if (!(most > 0)) return OK;
+    const double part = SLIPPING_STEP / most;
+    if (add_rates(s, t, y, S, parameter, part, 1 / (2 * part), rates) != OK) return FAILED;
+    return add_rates(s, t, y, S, parameter, -part, -1 / (2 * part), rates);
+}
+
+static int slips(const Solver *s) {
+    int any = 0;
+    for (int i = 0; i < s->system->frictions; i++)
+        any |= s->stepped.friction->loaded[i] && !s->state.stick_slip[i].sticks;
+    return any;
+}
+
+static void variation_rates(Solver *s, double t, const double *y, double *rates) {
+    const int n = system_states(s->system), sliding = slips(s);
+    for (int c = 0; c < s->columns && *s->state.varied; c++) {
+        const double *S = y + n * (1 + c);
+        const int parameter = s->column[c].parameter;
+        const Status status = sliding ? rates_by_differences(s, t, y, S, parameter, rates + n * c)
+                                      : rates_along(s, segment_instant(s, t), y, S, parameter, rates + n * c);
+        if (status != OK) saltation_end(s);
+    }
+    if (!*s->state.varied) memset(rates, 0, (size_t)(n * s->columns) * sizeof *rates);
+}
+
+/* ------------------------------------------------------------------ projection */
+
+/* The changes of f, G and nu along a column. */
+static void tangent_along(Solver *s, Instant at, const double *y, const double *S, int parameter) {
+    const System *system = s->system;
+    Sensitivity *w = &s->sensitivity;
+    memset(w->du, 0, (size_t)system->inputs * sizeof *w->du);
+    if (parameter >= 0) w->dp[parameter] = 1;
+    system->tangent(at.t, y, y + system->nq, at.u, at.p, 0, S, S + system->nq, w->du, w->dp, w->dM, w->dF, w->dG,
+                    w->dnu, w->dgamma, w->df, w->denergy);
+    if (parameter >= 0) w->dp[parameter] = 0;
+}
+
+/* A change of a unit quaternion turns it. */
+static void settle_quaternions(const System *system, const double *q, double *dq) {
+    for (int k = 0; k < system->quaternions; k++) {
+        const int *e = system->quaternion + 4 * k;
+        double along = 0;
+        for (int i = 0; i < 4; i++) along += q[e[i]] * dq[e[i]];
+        for (int i = 0; i < 4; i++) dq[e[i]] -= along * q[e[i]];
+    }
+}
+
+static Status project_places(Solver *s, Instant at, const double *y, int c, double *S) {
+    const System *system = s->system;
+    Mechanism *b = &s->stepped;
+    Sensitivity *w = &s->sensitivity;
+    const double *offset = column_at(s, c) + column_of_offset(system, 0);
+    tangent_along(s, at, y, S, s->column[c].parameter);
+    for (int k = 0; k < system->m; k++) w->c[k] = b->fixed[k] ? offset[k] - w->df[k] : 0;
+    if (linear_nearest(&b->linear, NULL, w->c, b->dq, NULL) != OK) return FAILED;
+    mechanism_move(b, 1, b->dq, S);
+    return OK;
+}
+
+static Status project_speeds(Solver *s, Instant at, const double *y, const int *active, int c, double *S) {
+    const System *system = s->system;
+    Mechanism *b = &s->stepped;
+    Sensitivity *w = &s->sensitivity;
+    double *dv = S + system->nq;
+    tangent_along(s, at, y, S, s->column[c].parameter);
+    for (int k = 0; k < system->m; k++) w->c[k] = active[k] ? w->dnu[k] - mechanism_row(b, k, dv) : 0;
+    for (int e = 0; e < system->entries; e++)
+        if (active[system->entry_row[e]]) w->c[system->entry_row[e]] -= w->dG[e] * y[system->nq + system->entry_column[e]];
+    if (linear_nearest(&b->linear, NULL, w->c, b->dq, NULL) != OK) return FAILED;
+    for (int j = 0; j < system->nv; j++) dv[j] += b->dq[j];
+    return OK;
+}
+
+static Status project_columns(Solver *s, Instant at, double *y) {
+    const System *system = s->system;
+    const int n = system_states(system), nq = system->nq;
+    Mechanism *b = &s->stepped;
+    int acting = 0, fixed = 0;
+    if (mechanism_evaluate(b, at, y, y + nq) != OK) return FAILED;
+    const int *active = b->sliding != NULL ? b->sliding->acting(b, s->active) : s->active;
+    for (int k = 0; k < system->m; k++) {
+        b->fixed[k] = active[k] && system->rows[k].kind != NONHOLONOMIC;
+        acting |= active[k];
+        fixed |= b->fixed[k];
+    }
+    if (fixed && linear_factor(&b->linear, b->M, b->G, b->fixed) != OK) return FAILED;
+    for (int c = 0; c < s->columns; c++) {
+        double *S = y + n * (1 + c);
+        if (fixed && project_places(s, at, y, c, S) != OK) return FAILED;
+        settle_quaternions(system, y, S);
+    }
+    if (acting && linear_factor(&b->linear, b->M, b->G, active) != OK) return FAILED;
+    for (int c = 0; c < s->columns && acting; c++)
+        if (project_speeds(s, at, y, active, c, y + n * (1 + c)) != OK) return FAILED;
+    for (int j = n; j < solver_width(s); j++)
+        if (!isfinite(y[j])) return fail(&s->why, "they are beyond a double at t = %.17g s", at.t);
+    return OK;
+}
+
+static Status variation_project(Solver *s, Instant at, double *y) {
+    const int n = system_states(s->system);
+    if (*s->state.varied && project_columns(s, at, y) != OK) saltation_end(s);
+    if (!*s->state.varied) memset(y + n, 0, (size_t)(n * s->columns) * sizeof *y);
+    return OK;
+}
+
+SHARED_VALUE const Variation VARIATION = {saltation_layout, variation_rates, variation_project, saltation_start,
+                                          saltation_pass,   saltation_jump,  saltation_ended};

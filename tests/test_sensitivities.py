@@ -1,0 +1,464 @@
+"""Derivatives of a run by parameters and start values, along the motion and through its events."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import fmpy
+import numpy as np
+import pytest
+from conftest import model_file, scene_of
+from instance import instance
+from runs import evenly
+from scipy.special import ellipj, ellipk
+from sympy import symbols
+from sympy.physics.mechanics import dynamicsymbols
+from typer.testing import CliRunner
+
+from lagfmu import Contact, Model, Parameter, Scene
+from lagfmu.errors import BuildError, RequestError
+from lagfmu.testing import app, prepare
+
+TIGHT = 1e-11  # tolerance of a run whose derivatives are held against closed forms
+STENCIL = ((-2, 1 / 12), (-1, -8 / 12), (1, 8 / 12), (2, -1 / 12))  # central, of fourth order
+
+Varied = Callable[..., Path]
+
+
+@pytest.fixture
+def varied(built: Any) -> Varied:
+    """varied(NAME, "lambda.rod:L", ...): an FMU of models/ with these derivatives, other starts if given."""
+
+    def get(name: str, *sensitivities: str, start: Any = None, **scene: Any) -> Path:
+        file, asked = scene_of(name)
+        model = file.model if start is None else replace(file.model, start=start)
+        return built(model, replace(asked, sensitivities=sensitivities, **scene))
+
+    return get
+
+
+def run(
+    fmu: Path, stop: float, points: int, start: Any = None, tolerance: float = TIGHT, **more: Any
+) -> Any:
+    """All outputs at the communication points."""
+    return evenly(fmu, stop, points, tolerance, start or {}, **more)
+
+
+def by_differences(
+    fmu: Path, stop: float, points: int, by: str, at: float, step: float, outputs: Sequence[str]
+) -> dict[str, np.ndarray]:
+    """The same derivatives by runs at 1e-13, with `by` a little beside its value."""
+    runs = [(w, run(fmu, stop, points, {by: at + k * step}, 1e-13)) for k, w in STENCIL]
+    return {name: sum(w * found[name] for w, found in runs) / step for name in outputs}
+
+
+# ------------------------------------------------------------------------------- smooth motion
+
+
+@pytest.mark.parametrize("name", ["PendulumCartesian", "PendulumNullspace"])
+def test_the_force_in_a_rod_changes_with_its_length(varied, name):
+    """theta(t) = Theta(t sqrt(g/L)) from rest at 1 rad, so that d theta/dL = -t theta'/(2 L), and the
+    multiplier of x^2 + y^2 = L^2, -m g (3 cos theta - 2 cos 1)/(2 L), follows."""
+    found = run(varied(name, "lambda.rod:L,g"), 2.0, 20)
+    t, k = found["time"], math.sin(0.5)
+    sn, cn, _, _ = ellipj(math.sqrt(9.81) * t + ellipk(k**2), k**2)
+    angle = 2 * np.arcsin(k * sn)
+    rate = 2 * k * cn * math.sqrt(9.81)
+    force = 9.81 * (3 * np.cos(angle) - 2 * math.cos(1))
+    per_angle = 3 * 9.81 * np.sin(angle) / 2
+    by_length = per_angle * -t * rate / 2 + force / 2
+    by_gravity = per_angle * t * rate / (2 * 9.81) - force / (2 * 9.81)
+    assert found["sensitivity.valid"].all()
+    np.testing.assert_allclose(found["sensitivity.lambda.rod.by.L"], by_length, atol=1e-9)
+    np.testing.assert_allclose(found["sensitivity.lambda.rod.by.g"], by_gravity, atol=1e-10)
+
+
+def test_a_circle_stays_one_and_energy_is_what_it_was(varied):
+    """On x^2 + y^2 = L^2: x x_L + y y_L = L at every time, however coarse the run. From rest at 1 rad the
+    energy is -m g L cos 1."""
+    fmu = varied("PendulumCartesian", "x:L", "y:L", "energy.total:L,m")
+    found = run(fmu, 3.0, 30, tolerance=1e-5)
+    along = sum(found[q] * found[f"sensitivity.{q}.by.L"] for q in "xy")
+    np.testing.assert_allclose(along, 1.0, atol=1e-14)
+    found = run(fmu, 3.0, 30)
+    for by in "Lm":
+        np.testing.assert_allclose(
+            found[f"sensitivity.energy.total.by.{by}"], -9.81 * math.cos(1), rtol=1e-10
+        )
+
+
+@pytest.mark.parametrize("name", ["PendulumCartesian", "Hemisphere", "HalfCar", "KnifeEdge"])
+def test_the_run_beside_which_they_go_is_the_same(varied, built, name):
+    """Derivatives look on: with them every value has the bits that it has without."""
+    file, asked = scene_of(name)
+    number = file.model.parameters[0].symbol
+    plain = built(file.model, replace(asked, method="dop853"))
+    both = [run(fmu, 1.0, 20, None, 1e-8) for fmu in (plain, varied(name, f"*:{number}"))]
+    for output in both[0].dtype.names:
+        assert both[0][output].tobytes() == both[1][output].tobytes(), output
+
+
+def test_reduced_coordinates_give_the_derivatives_of_all(varied):
+    """The disk of example 7.9 rolls with y'' = (2/3) g sin alpha and lambda = -M g sin(alpha)/3."""
+    fmu = varied("InclineDiskMinimal", "*:g,alpha,R")
+    found = run(fmu, 1.0, 10)
+    t, alpha = found["time"], math.pi / 6
+    y = t**2 / 3
+    np.testing.assert_allclose(found["sensitivity.y.by.g"], y * math.sin(alpha), atol=1e-13)
+    np.testing.assert_allclose(found["sensitivity.y.by.alpha"], y * 9.81 * math.cos(alpha))
+    np.testing.assert_allclose(found["sensitivity.lambda.rolling.by.g"], -math.sin(alpha) / 3)
+    of_angle = -(found["theta"] / 0.1)  # theta = y/R
+    np.testing.assert_allclose(found["sensitivity.theta.by.R"], of_angle, atol=1e-11)
+
+
+# ------------------------------------------------------------------------------- contacts
+
+
+def test_when_the_particle_leaves_the_hemisphere(varied):
+    """Times go with sqrt(a/g): dT/da = T/(2 a), dT/dg = -T/(2 g), dT/dm = 0; and dT/dtheta0 =
+    -1.01696078397883 at theta0 = 0.3 (the quadrature of the energy integral, differentiated)."""
+    fmu = varied("Hemisphere", "departure.surface.time:a,g,m,theta")
+    found = run(fmu, 1.0, 4, {"theta": 0.3})[-1]
+    time = found["departure.surface.time"]
+    expected = {"a": time / 2, "g": -time / 2 / 9.81, "m": 0.0, "theta": -1.01696078397883}
+    for by, value in expected.items():
+        assert abs(found[f"sensitivity.departure.surface.time.by.{by}"] - value) < 1e-10, by
+
+
+def test_the_flight_after_the_departure(varied):
+    """It leaves at cos theta = (2/3) cos theta0, whatever a and g are, with v^2 = g a cos theta; then it
+    flies, and r^2 = a^2 + v^2 tau^2 - a g cos(theta) tau^2 + v g sin(theta) tau^3 + g^2 tau^4/4 at tau
+    after it."""
+    names = ("departure.surface.theta", "departure.surface.velocity.theta", "r")
+    found = run(varied("Hemisphere", *(f"{n}:a" for n in names)), 1.0, 4, {"theta": 0.3})[-1]
+    spin = found["departure.surface.velocity.theta"]
+    assert abs(found["sensitivity.departure.surface.theta.by.a"]) < 1e-10
+    of_spin = found[
+        "sensitivity.departure.surface.velocity.theta.by.a"
+    ]  # spin = sqrt(g cos(theta)/a)
+    assert abs(of_spin + spin / 2) < 1e-10
+
+    def height(a: float) -> float:  # r at t = 1, in units of a a function of t sqrt(g/a)
+        tau = 1 - found["departure.surface.time"] * math.sqrt(a)
+        c = 2 / 3 * math.cos(0.3)
+        s, v = math.sqrt(1 - c**2), math.sqrt(9.81 * a * c)
+        x, z = a * s + v * c * tau, a * c - v * s * tau - 9.81 * tau**2 / 2
+        return math.hypot(x, z)
+
+    by_a = sum(w * height(1 + k * 1e-3) for k, w in STENCIL) / 1e-3
+    assert abs(found["sensitivity.r.by.a"] - by_a) < 1e-9
+
+
+def test_a_bouncing_ball_after_several_impacts(varied):
+    """From rest at h with restitution e: impact n comes at sqrt(2 h/g) (1 + 2 (e + ... + e^(n-1))), with
+    the impulse (1 + e) m v e^(n-1), v = sqrt(2 g h); between impacts dE = m g dh e^(2n)."""
+    fmu = varied(
+        "BouncingBall", "closing.floor.time:*", "closing.floor.impulse:*", "energy.total:y,e"
+    )
+    h, g, e, n = 1.0, 9.81, 0.7, 4
+    found = run(fmu, 2.0, 4)[-1]
+    assert found["closing.floor.count"] == n
+    fall, v = math.sqrt(2 * h / g), math.sqrt(2 * g * h)
+    powers = 1 + 2 * sum(e**k for k in range(1, n))
+    slope = 2 * sum(k * e ** (k - 1) for k in range(1, n))
+    times = {"e": fall * slope, "g": -fall * powers / 2 / g, "y": fall * powers / 2, "m": 0.0}
+    blow = (1 + e) * v * e ** (n - 1)
+    impulses = {
+        "e": v * (e ** (n - 1) + (1 + e) * (n - 1) * e ** (n - 2)),
+        "g": blow / 2 / g,
+        "y": blow / 2,
+        "m": blow,
+    }
+    for by in times:
+        assert abs(found[f"sensitivity.closing.floor.time.by.{by}"] - times[by]) < 1e-10, by
+        assert abs(found[f"sensitivity.closing.floor.impulse.by.{by}"] - impulses[by]) < 1e-9, by
+    assert abs(found["sensitivity.energy.total.by.y"] - g * e ** (2 * n)) < 1e-9
+    assert abs(found["sensitivity.energy.total.by.e"] - g * h * 2 * n * e ** (2 * n - 1)) < 1e-9
+
+
+def test_half_a_car_that_leaves_its_road(varied, built):
+    """Two departures and two landings on a tabulated road: as central differences of tight runs, at the
+    events and after them."""
+    file, asked = scene_of("HalfCar")
+    fmu = varied("HalfCar", "z:k,c", "lambda.*:k,c", "departure.*:k,c", "closing.*:k,c")
+    plain = built(file.model, replace(asked, method="dop853"))
+    outputs = [
+        name.partition(".")[2].rpartition(".by.")[0]
+        for name in fmpy_names(fmu)
+        if name.startswith("sensitivity.") and name.endswith(".by.k")
+    ]
+    outputs = [name for name in outputs if "velocity" not in name]
+    found = run(fmu, 1.5, 15)
+    for by, at in (("k", 4e4), ("c", 3e3)):
+        other = by_differences(plain, 1.5, 15, by, at, 1e-4 * at, outputs)
+        for name in outputs:
+            mine, size = found[f"sensitivity.{name}.by.{by}"], np.abs(other[name]).max()
+            assert np.abs(mine - other[name]).max() <= 1e-7 * size + 1e-13, (name, by)
+
+
+def fmpy_names(fmu: Path) -> list[str]:
+    return [v.name for v in fmpy.read_model_description(fmu).modelVariables]
+
+
+# ------------------------------------------------------------------------------- friction
+
+
+def test_a_ball_thrown_without_spin(varied):
+    """It rolls after T = 2 v0/(7 mu g), at (5/7) v0 and 12 v0^2/(49 mu g) on; from there x = 12 v0^2/(49
+    mu g) + (5/7) v0 (t - T)."""
+    fmu = varied("Bowling", "sticking.grip.time:der(x),mu,g,m,R", "x:der(x),mu", "der(x):der(x),mu")
+    found = run(fmu, 3.0, 6)
+    v0, mu, g = 8.0, 0.12, 9.81
+    time = 2 * v0 / (7 * mu * g)
+    last = found[-1]
+    expected = {"velocity.x": time / v0, "mu": -time / mu, "g": -time / g, "m": 0.0, "R": 0.0}
+    for by, value in expected.items():
+        mine = last[f"sensitivity.sticking.grip.time.by.{by}"]
+        assert abs(mine - value) < 1e-7 * max(abs(value), 1), by
+    way = 12 * v0 / (49 * mu * g)  # of x, times v0; and (5/7) v0 T = 10 v0 way / 12
+    by_speed = 2 * way + 5 / 7 * 3 - 2 * 10 / 12 * way
+    by_friction = -way * v0 / mu + 10 / 12 * way * v0 / mu
+    assert abs(last["sensitivity.x.by.velocity.x"] - by_speed) < 1e-7
+    assert abs(last["sensitivity.x.by.mu"] - by_friction) < 1e-6
+    assert abs(last["sensitivity.velocity.x.by.velocity.x"] - 5 / 7) < 1e-9
+    assert abs(last["sensitivity.velocity.x.by.mu"]) < 1e-7
+
+
+def test_a_block_that_sticks_and_slips_on_a_belt(varied):
+    """With d = (mu_s - mu_k) m g/k and omega = sqrt(k/m) it slips for (2/omega)(pi - arctan(d omega/v))
+    and sticks for 2 d/v, at first until the spring holds mu_s m g; and each of these times has its
+    derivatives."""
+    speed = symbols("speed", positive=True)
+    x = dynamicsymbols("x")
+    by = "speed,k,mu_s,mu_k,m"
+    fmu = varied(
+        "Belt",
+        f"slipping.grip.time:{by}",
+        f"sticking.grip.time:{by}",
+        start={x: 0.0, x.diff(): speed},
+    )
+    found = run(fmu, 3.0, 12)
+    at = {"speed": 0.2, "k": 100.0, "mu_s": 0.5, "mu_k": 0.3, "m": 1.0}
+
+    def times(values: dict[str, float], count: int) -> tuple[float, float]:
+        v, k, m = values["speed"], values["k"], values["m"]
+        d = (values["mu_s"] - values["mu_k"]) * m * 9.81 / k
+        omega = math.sqrt(k / m)
+        slip = 2 / omega * (math.pi - math.atan(d * omega / v))
+        first = values["mu_s"] * m * 9.81 / k / v
+        begun = first + (count - 1) * (slip + 2 * d / v)
+        return begun, begun + slip
+
+    for row in found:
+        count = row["slipping.grip.count"]
+        if count == 0 or row["sticking.grip.count"] != count:
+            continue
+        for name, value in at.items():
+            step = 1e-3 * value
+            for k, event in enumerate(("slipping", "sticking")):
+                expected = sum(
+                    w * times({**at, name: value + j * step}, int(count))[k] for j, w in STENCIL
+                )
+                mine = row[f"sensitivity.{event}.grip.time.by.{name}"]
+                assert abs(mine - expected / step) < 1e-6 * max(1, abs(mine)), (name, event)
+    assert found["sensitivity.valid"].all()
+
+
+# ------------------------------------------------------------------------------- where there is none
+
+
+def test_a_start_that_another_radius_would_open(varied):
+    """At r = a the particle rests on the sphere; where r is a plain number, a smaller sphere leaves it in
+    the air."""
+    r, theta = dynamicsymbols("r theta")
+    fmu = varied("Hemisphere", "lambda.surface:a,g", start={r: 1.0, theta: 0.3})
+    with instance(fmu) as one:
+        one.start()
+        assert not one.get("sensitivity.valid")
+        one.step(0.1)
+        assert one.get("sensitivity.lambda.surface.by.g") == 0
+        told = [text for _, _, text in one.log if "sensitivity" in text]
+    assert len(told) == 1
+    assert "the start: with a little more or less of a" in told[0]
+
+
+def thrown(slope: float) -> Model:
+    """A ball that falls beside a wall at x = 1 onto a floor, both of which may be reached at one instant."""
+    x, z = dynamicsymbols("x z")
+    m, g, v, b = symbols("m g v b", positive=True)
+    return Model(
+        name="Corner",
+        lagrangian=m * (x.diff() ** 2 + z.diff() ** 2) / 2 - m * g * z,
+        coordinates={x: "m", z: "m"},
+        constraints=[
+            Contact("floor", z + slope * x, "on the floor", restitution=0.5),
+            Contact("wall", b - x, "at the wall", restitution=0.5),
+        ],
+        parameters=[
+            Parameter(m, 1.0, "kg"),
+            Parameter(g, 2.0, "m/s^2"),
+            Parameter(v, 1.0, "m/s"),
+            Parameter(b, 1.0, "m"),
+        ],
+        start={x: 0.0, z: b - slope * b, x.diff(): v},
+    )
+
+
+def test_two_contacts_that_are_met_at_one_instant(built):
+    """A ball with x = v t and z = 1 - 0.2 b - t^2 meets the floor z + 0.2 x = 0 and the wall x = b at t =
+    1 if v = 1; with a little more speed the wall comes first, and on a floor that leans that matters."""
+    fmu = built(thrown(0.2), Scene("Corner", stop_time=2.0, sensitivities=("x:v",)))
+    with instance(fmu) as one:
+        one.start()
+        for _ in range(15):
+            one.step(0.1)
+        assert one.get("closing.floor.count") == one.get("closing.wall.count") == 1
+        assert not one.get("sensitivity.valid")
+        assert one.get("sensitivity.x.by.v") == 0
+        told = [text for _, _, text in one.log if "sensitivity" in text]
+    assert len(told) == 1
+    assert "'floor'" in told[0]
+    assert "of v it goes another way" in told[0]
+    assert run(fmu, 1.4, 2, {"v": 0.9})["sensitivity.valid"].all()  # there the floor comes first
+
+
+def test_a_contact_that_is_only_touched(built):
+    """A ball thrown up from z = h - b with the speed that takes it to h + 1 touches a ceiling at z = b = 1
+    m with the speed s = 2 sqrt(h), h = 1e-8 m, g = 2 m/s^2: to a tolerance of 1e-8 it may not touch it
+    at all. To one of 1e-13 it does, dt_e/db = 2/s, ds/db = -4/s, and z = b - e s tau - tau^2 at tau
+    after it goes with them."""
+    z = dynamicsymbols("z")
+    m, g, b, h = symbols("m g b h", positive=True)
+    model = Model(
+        name="Touch",
+        lagrangian=m * z.diff() ** 2 / 2 - m * g * z,
+        coordinates={z: "m"},
+        constraints=[Contact("ceiling", b - z, "below the ceiling", restitution=0.5)],
+        parameters=[
+            Parameter(m, 1.0, "kg"),
+            Parameter(g, 2.0, "m/s^2"),
+            Parameter(b, 1.0, "m"),
+            Parameter(h, 1e-8, "m"),
+        ],
+        start={z: h - b, z.diff(): math.sqrt(8)},
+    )
+    fmu = built(model, Scene("Touch", stop_time=2.0, sensitivities=("z:b",)))
+    found = run(fmu, 2.0, 10, tolerance=1e-8)
+    assert found["closing.ceiling.count"][-1] == 1
+    assert found["sensitivity.valid"][0]
+    assert not found["sensitivity.valid"][-1]
+    fine = run(fmu, 2.0, 10, tolerance=1e-13)[-1]
+    s, tau = 2 * math.sqrt(1e-8), 2.0 - fine["closing.ceiling.time"]
+    assert fine["sensitivity.valid"]
+    assert abs(fine["sensitivity.z.by.b"] / (1 + 2 * tau / s + 1 + 4 * tau / s) - 1) < 1e-5
+
+
+# ------------------------------------------------------------------------------- the FMU
+
+
+def test_a_restored_state_repeats_them_bit_for_bit(varied):
+    """Columns, and what is known of events, belong to the saved state."""
+    fmu = varied("Hemisphere", "*:a,theta")
+    with instance(fmu) as one:
+        one.start({"theta": 0.3})
+        one.step(0.4)
+        state = one.fmu.getFMUState()
+        data, now = one.fmu.serializeFMUState(state), one.time
+        for _ in range(5):
+            one.step(0.1)
+        expected = one.outputs()
+        one.fmu.setFMUState(one.fmu.deSerializeFMUstate(data))
+        one.time = now
+        for _ in range(5):
+            one.step(0.1)
+        assert one.outputs() == expected
+        assert expected["sensitivity.departure.surface.time.by.a"] != 0
+
+
+def test_error_bars_stand_beside_them(varied):
+    """A scene may ask for both: the finer run takes no derivatives, and the delivered run is the same."""
+    alone = varied("Hemisphere", "lambda.surface:a")
+    both = varied("Hemisphere", "lambda.surface:a", error_bars=True)
+    one, other = (run(fmu, 1.0, 10, {"theta": 0.3}, 1e-8) for fmu in (alone, both))
+    for name in one.dtype.names:
+        assert one[name].tobytes() == other[name].tobytes(), name
+    assert (other["error.lambda.surface"] > 0).any()
+
+
+def test_names_units_and_descriptions(varied):
+    """sensitivity.OUTPUT.by.PARAMETER, in the unit of the one over that of the other."""
+    fmu = varied(
+        "Hemisphere",
+        "departure.surface.time:theta,a",
+        "der(theta,2):m",
+        "lambda.surface:der(theta)",
+    )
+    described = {v.name: v for v in fmpy.read_model_description(fmu).modelVariables}
+    found = {name: v.unit for name, v in described.items() if name.startswith("sensitivity.")}
+    assert found == {
+        "sensitivity.departure.surface.time.by.a": "s/m",
+        "sensitivity.departure.surface.time.by.theta": "s/rad",
+        "sensitivity.acceleration.theta.by.m": "rad/(kg.s2)",
+        "sensitivity.lambda.surface.by.velocity.theta": "N.s/rad",
+        "sensitivity.valid": None,
+    }
+    text = described["sensitivity.departure.surface.time.by.theta"].description
+    assert text.startswith("derivative of departure.surface.time by the start of theta")
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        ("lambda.surfac:a", "'lambda.surfac' is unknown; did you mean 'lambda.surface'"),
+        ("lambda.surface:b", "parameter or start value 'b' is unknown; did you mean"),
+        ("lambda.surface", "expected OUTPUT:PARAMETER,..."),
+    ],
+)
+def test_what_is_not_there_is_named(asked, said):
+    """Names that mean nothing are told with those that are near."""
+    with pytest.raises(RequestError, match=r"(?s).*") as error:
+        prepare(model_file("hemisphere").model, Scene("Bad", sensitivities=(asked,)))
+    assert said in str(error.value)
+
+
+def test_a_number_that_is_fixed_has_no_derivative():
+    """What the scene makes a number in the code cannot be another."""
+    with pytest.raises(RequestError, match="'a', which the scene fixes"):
+        prepare(model_file("hemisphere").model, Scene("Bad", fixed=("a",), sensitivities=("r:a",)))
+
+
+def test_methods_whose_steps_are_not_differentiated():
+    """radau5 and rattle are refused by name; auto is dop853."""
+    with pytest.raises(RequestError, match="sensitivities with the method 'radau5'"):
+        Scene("Bad", method="radau5", sensitivities=("r:a",))
+    assert Scene("Good", sensitivities=("r:a",)).method == "dop853"
+
+
+def test_the_python_target_refuses_them(built):
+    """It takes no derivatives of a run, and says so when it is built."""
+    with pytest.raises(BuildError, match="it takes no derivatives of a run"):
+        built(
+            model_file("hemisphere").model,
+            Scene("Hemisphere", sensitivities=("r:a",)),
+            target="python",
+        )
+
+
+def test_they_are_asked_for_on_the_command_line(tmp_path):
+    """lagfmu build --sensitivities OUTPUT:PARAMETER,..., repeatable."""
+    model = Path(__file__).parent.parent / "models" / "hemisphere.py"
+    asked = ["--sensitivities", "departure.surface.time:theta,a", "--sensitivities", "r:a"]
+    done = CliRunner().invoke(
+        app, ["build", str(model), "--out", str(tmp_path), "--no-check", *asked]
+    )
+    assert done.exit_code == 0, done.output
+    names = fmpy_names(tmp_path / "native" / "Hemisphere.fmu")
+    assert {n for n in names if ".by." in n} == {
+        "sensitivity.departure.surface.time.by.a",
+        "sensitivity.departure.surface.time.by.theta",
+        "sensitivity.r.by.a",
+    }
