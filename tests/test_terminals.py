@@ -75,6 +75,7 @@ def test_the_icon_is_the_picture_at_the_start(
     assert fromstring(drawn["terminalsAndIcons/icon.svg"]).tag.endswith("svg")
     assert icon(prepared("PendulumAngle")) == drawn
     assert icon(prepare(absorber)) == {}
+    assert icon(prepared("BouncingBall")).keys() == drawn.keys()  # a point above its floor
     model = prepared("PendulumCartesian").model
     with zipfile.ZipFile(build_fmu(model, tmp_path, target="python", check=False)) as fmu:
         found = fromstring(fmu.read("terminalsAndIcons/terminalsAndIcons.xml"))

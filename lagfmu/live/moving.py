@@ -228,6 +228,8 @@ class View:
         scenery = [s for s in shapes if s.kind in ("ground", "line") and not s.moves]
         seen = [s for s in shapes if s not in scenery]
         low, high = _box(_reached(seen or scenery))
+        if not (high - low).max() > 0:  # a point: it is seen with what is around it
+            low, high = _box(_reached(shapes))
         self.size = float(max(*(high - low), 1e-9))
         tips = [
             s.points[0]
