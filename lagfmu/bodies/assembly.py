@@ -230,15 +230,18 @@ def _parallel(names: Sequence[str], values: Array) -> Iterator[str]:
 
 def _open(names: Sequence[str], values: Array, missed: Array) -> Iterator[str]:
     """Which joints miss, the worst first."""
+    if not np.isfinite(values).all():
+        lost = {n.split(".")[0] for n, x in zip(names, values, strict=True) if not np.isfinite(x)}
+        for joint in sorted(lost):
+            yield f"joint {joint!r} has no finite value where it begins: start it elsewhere"
+        return
     worst: dict[str, tuple[float, float]] = {}
     by_name = dict(zip(names, values.tolist(), strict=True))
     for name, value, miss in zip(names, values.tolist(), missed.tolist(), strict=True):
         joint = name.split(".")[0]
         worst[joint] = max(worst.get(joint, (0.0, 0.0)), (miss, abs(value)))
     for joint, (miss, value) in sorted(worst.items(), key=lambda item: -item[1][0]):
-        if not math.isfinite(value):
-            yield f"joint {joint!r} has no finite value where it begins: start it elsewhere"
-        elif f"{joint}.{CROSS}" in by_name and miss > CLOSED:
+        if f"{joint}.{CROSS}" in by_name and miss > CLOSED:
             off = math.degrees(math.asin(min(abs(by_name[f"{joint}.{CROSS}"]), 1.0)))
             yield (
                 f"universal joint {joint!r} cannot be closed: at the nearest that was found its axes miss "
