@@ -1,9 +1,10 @@
 /* fmi3_calls.h -- which function may be called in which mode (FMI 3.0.2, "Allowed Function Calls" of the states in
  * sections 2.3, 3.2 and 4.2).
  *
- * Four things are allowed beyond it, since nothing is lost by them: what can be set may be read from the beginning,
- * every start value may also be set in initialization mode, after a call that was refused or a step that was
- * discarded the instance goes on from where it stands, and values may be read in Step Mode after inputs were set. */
+ * Four things are allowed beyond it, since nothing is lost by them: every start value may also be set in
+ * initialization mode, after a call that was refused or a step that was discarded the instance goes on from where it
+ * stands, values may be read in Step Mode after inputs were set, and how many states there are may be asked at any
+ * time. */
 #ifndef LAGFMU_FMI3_CALLS_H
 #define LAGFMU_FMI3_CALLS_H
 
@@ -37,16 +38,16 @@ enum {
     CALL(fmi3EnterConfigurationMode, 0, 0) /* there are no structural parameters */       \
     CALL(fmi3ExitConfigurationMode, 0, 0)                                                 \
     FMI3_TABLE_OF_VALUES(CALL)                                                            \
-    CALL(fmi3GetClock, FMI3_CLOCKED, FMI3_CLOCKED)                                        \
+    CALL(fmi3GetClock, EVENT, EVENT)                                                      \
     CALL(fmi3SetClock, EVENT, EVENT)                                                      \
     CALL(fmi3GetIntervalDecimal, FMI3_CLOCKED, FMI3_CLOCKED)                              \
     CALL(fmi3GetIntervalFraction, FMI3_CLOCKED, FMI3_CLOCKED)                             \
-    CALL(fmi3GetShiftDecimal, FMI3_CLOCKED, FMI3_CLOCKED)                                 \
-    CALL(fmi3GetShiftFraction, FMI3_CLOCKED, FMI3_CLOCKED)                                \
+    CALL(fmi3GetShiftDecimal, INITIALIZATION, INITIALIZATION)                             \
+    CALL(fmi3GetShiftFraction, INITIALIZATION, INITIALIZATION)                            \
     CALL(fmi3SetIntervalDecimal, FMI3_CLOCKED, FMI3_CLOCKED)                              \
     CALL(fmi3SetIntervalFraction, FMI3_CLOCKED, FMI3_CLOCKED)                             \
-    CALL(fmi3SetShiftDecimal, FMI3_CLOCKED, FMI3_CLOCKED)                                 \
-    CALL(fmi3SetShiftFraction, FMI3_CLOCKED, FMI3_CLOCKED)                                \
+    CALL(fmi3SetShiftDecimal, INITIALIZATION, INITIALIZATION)                             \
+    CALL(fmi3SetShiftFraction, INITIALIZATION, INITIALIZATION)                            \
     CALL(fmi3GetNumberOfVariableDependencies, FMI3_ANY_X, FMI3_ANY_S)                     \
     CALL(fmi3GetVariableDependencies, FMI3_ANY_X, FMI3_ANY_S)                             \
     CALL(fmi3GetFMUState, FMI3_ANY_X, FMI3_ANY_S)                                         \
