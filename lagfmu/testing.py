@@ -41,7 +41,7 @@ from .fmu.target import NoCompilerWarning
 from .fmu.terminals import terminals
 from .fmu.write import as_built, write
 from .interface.rules import problems_of
-from .live import moving, solids, wasm
+from .live import moving, solids, view, wasm
 from .live.icon import icon
 from .live.moving import Moving
 from .live.playable import playable, told_by

@@ -14,7 +14,7 @@ from PIL import Image
 from typer.testing import CliRunner
 
 from lagfmu import simulate
-from lagfmu.testing import Prepared, app, film, moving, solids, told_by
+from lagfmu.testing import Prepared, app, film, moving, solids, told_by, view
 
 Fmu = Callable[[str], Path]
 
@@ -43,10 +43,10 @@ def test_the_mass_falls_in_the_film(native_fmu: Fmu, tmp_path: Path) -> None:
         lowest = []
         for frame in (0, 20):
             image.seek(frame)
-            bob = places(image, moving.BOB)
+            bob = places(image, view.BOB)
             left = bob[bob[:, 1] < bob[:, 1].mean()]
             lowest.append(left[:, 0].max())
-            assert len(places(image, moving.FORCE)) > 0
+            assert len(places(image, view.FORCE)) > 0
         assert lowest[1] > lowest[0] + 10
 
 
@@ -64,17 +64,17 @@ def test_a_film_is_cut_to_the_motion_and_tells_the_value_of_each_arrow(
         for frame in range(0, image.n_frames, 5):
             image.seek(frame)
             panel = image.crop((0, 0, across, image.height))
-            force = places(panel, moving.FORCE)
+            force = places(panel, view.FORCE)
             assert force[:, 0].min() > title
             assert force[:, 1].min() > 2
             assert force[:, 1].max() < across - 3
             label = force[:, 1].max() - force[:, 1].min()
             assert label > 60  # pixels: a name and a value, beside the arrow, which is upright
-            drawn = places(panel, moving.INK)
+            drawn = places(panel, view.INK)
             drawn = drawn[drawn[:, 0] > title]
             assert np.ptp(drawn[:, 1]) > 0.75 * across
             beside = image.crop((across, 0, image.width, image.height))
-            dots.append(places(beside, moving.FORCE).mean(axis=0))
+            dots.append(places(beside, view.FORCE).mean(axis=0))
     rows, columns = np.array(dots).T
     assert (np.diff(columns) > 0).all()
     assert rows[-1] > rows[0] + 60

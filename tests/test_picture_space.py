@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import sympy as sp
+from browser import Page
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Box, Disk, Line, Pivot, Rod, Scene, Sphere
@@ -23,7 +24,15 @@ from lagfmu.bodies import (
     mechanism,
 )
 from lagfmu.errors import BuildError, LagfmuWarning, ModelError
-from lagfmu.testing import as_bytes, picture_of, prepare, read_picture, solid
+from lagfmu.testing import (
+    as_bytes,
+    picture_of,
+    playable,
+    prepare,
+    read_picture,
+    render,
+    solid,
+)
 from lagfmu.testing import picture_values as values
 
 ground = Ground()
@@ -178,6 +187,53 @@ def test_a_joint_shows_its_kind_and_axis() -> None:
     assert pins["pin"]["axis"] == [0.0, 0.6, 0.8]
     assert set(pins) == {"pin", "sleeve"}
     assert [s["kind"] for s in shapes].count("rod") == 1
+
+
+def test_a_marker_that_is_read_shows_its_axes() -> None:
+    """A frame at the marker whose z axis was laid onto (0, 3, 4): its origin and axes move with the body."""
+    body = Body("bob", mass=1.0, inertia=(0.02, 0.02, 0.01), center=(0.1, 0, -0.5), shape=())
+    tip = body.at((0, 0, -1), axis=(0, 3, 4))
+    joint = Spherical("pin", ground.at((0, 0, 2)), body.at((0, 0, 0)))
+    shapes = drawn(mechanism("Read", bodies=[body], joints=[joint], read={"tip": tip}))
+    (frame,) = (s for s in shapes if s["kind"] == "frame")
+    e = np.array([0.5, -0.5, 0.1, 0.7])
+    at = look((1, 2, 3), e, **{"tip.z": -1.0})
+    R = matrix(e)
+    found = [[values(x, at) for x in axis] for axis in frame["axes"]]
+    np.testing.assert_allclose(found[2], R @ [0, 0.6, 0.8], atol=1e-15)
+    np.testing.assert_allclose(np.cross(found[0], found[1]), found[2], atol=1e-15)
+    point = [values(x, at) for x in frame["at"]]
+    np.testing.assert_allclose(point, [1, 2, 3] + R @ [-0.1, 0, -0.5], atol=1e-15)
+
+
+def test_a_body_of_the_plane_may_have_a_shape(tmp_path: Path, browser: Any) -> None:
+    """A box that is turned with its body, a bar as thick as it says: both filled, in the page's own scale."""
+    arm = Body(
+        "arm", mass=1.0, inertia=0.1, shape=[Box((0, 0), (2, 0.5)), Rod((0, 0), (0, 1), 0.1)]
+    )
+    joint = Revolute("pin", ground.at((0, 0)), arm.at((-1, 0)))
+    model = mechanism("Plane", plane="xy", bodies=[arm], joints=[joint], start={"angle.pin": 0.3})
+    out = tmp_path / "plane.html"
+    out.write_text(render(playable(prepare(model, Scene("Plane")))), encoding="utf-8")
+    page = Page(browser, out)
+    page.until("lagfmu.runs")
+    outlines = page.tab.locator("#picture .solid").all()
+    box, bar = (corners(str(o.get_attribute("d"))) for o in outlines)
+    sides = np.linalg.norm(box - np.roll(box, 1, axis=0), axis=1)
+    scale = sides.max() / 2
+    assert sorted(sides) == pytest.approx(scale * np.array([0.5, 0.5, 2, 2]), rel=1e-2)
+    long = (box - np.roll(box, 1, axis=0))[np.argmax(sides)]
+    assert abs(long[1] / long[0]) == pytest.approx(np.tan(0.3), rel=1e-2)
+    thick = np.linalg.norm(bar - np.roll(bar, 1, axis=0), axis=1)
+    assert sorted(thick) == pytest.approx(scale * np.array([0.2, 0.2, 1, 1]), rel=1e-2)
+    page.close()
+    assert page.problems == []
+
+
+def corners(path: str) -> Any:
+    """Of the first polygon of an SVG path [pixels]."""
+    points = path.removeprefix("M").split("Z")[0].split()
+    return np.array([[float(x) for x in p.split(",")] for p in points])
 
 
 def test_a_shape_that_no_body_has_is_refused_by_name() -> None:

@@ -17,6 +17,7 @@ from ..model.picture import (
     Box,
     Direction,
     Disk,
+    Frame,
     Line,
     Pivot,
     Rod,
@@ -63,6 +64,7 @@ def picture_of(draft: Draft, parts: Sequence[Any]) -> list[Shape]:
     for part in parts:
         shapes += [] if planar else _of_part(draft, part)
         shapes += [_curve(draft, part)] if isinstance(part, PointOnCurve) else []
+    shapes += [Frame(_drawn(draft, p.point), _turn(draft, p)) for p in draft.readings.values()]
     for part in parts:
         if part.name in draft.wrenches and isinstance(getattr(part, "second", None), Marker):
             shapes.append(_force(draft, part))
@@ -154,16 +156,20 @@ def _carried(draft: Draft, motion: Motion, shape: Any) -> Shape:
     if isinstance(shape, Rod | Spring):
         return replace(shape, start=there(shape.start), end=there(shape.end))
     if isinstance(shape, Box):
-        frame = placed(shape.center, shape.rotation)
-        turned: Any = frame.angle
-        if len(draft.components) == 3:
-            turned = sp.Matrix(3, 3, lambda i, k: frame.axes[k].value[i])
-        return Box(there(shape.center), shape.size, turned)
+        turn = _turn(draft, placed(shape.center, shape.rotation))
+        return Box(there(shape.center), shape.size, turn)
     if isinstance(shape, Disk) and len(draft.components) == 2:
         angle = placed(shape.center).angle + (shape.angle or 0)
         return replace(shape, center=there(shape.center), angle=angle)
     found: Shape = replace(shape, center=there(shape.center))
     return found
+
+
+def _turn(draft: Draft, placed: Placed) -> Any:
+    """An angle in the plane; in space the matrix whose columns are its axes."""
+    if len(draft.components) == 2:
+        return placed.angle
+    return sp.Matrix(3, 3, lambda i, k: placed.axes[k].value[i])
 
 
 def _of_part(draft: Draft, part: Any) -> Iterator[Shape]:

@@ -12,7 +12,8 @@ from ..numeric.instant import at_start, expanded
 from ..page.picture import names_in, picture_of
 from ..prepare.consistency import posed
 from ..prepare.prepare import Prepared
-from .moving import Moving, View
+from .moving import Moving, in_order
+from .view import View
 
 SIDE, DOTS = 1.28, 100  # in, and dots an inch
 FORCES = ("arrow", "direction")  # shapes that are no bodies
@@ -50,8 +51,8 @@ def _drawn(shapes: list[Moving], kind: str) -> bytes:
     axes: Any = figure.add_axes((0, 0, 1, 1))
     view = View(shapes, labels=False)
     view.set(axes, np.empty((0, 3)))
-    for shape in sorted(shapes, key=lambda s: s.depth(0) if s.facets else np.inf):
-        shape.draw(axes, 0, view)
+    for shape in in_order(shapes, 0):
+        view.draw(axes, shape, 0)
     file = io.BytesIO()
     undated = {"Software": None} if kind == "png" else {"Date": None, "Creator": None}
     with matplotlib.rc_context({"svg.hashsalt": "lagfmu"}):

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from .moving import Array, Moving, View
+from .moving import Array, Moving, in_order
+from .view import View
 
 WIDE, HIGH = 4.2, 3.2  # in, of a sketch at most
 
@@ -41,10 +42,8 @@ class Stage:
     def draw(self, axes: Any, k: int) -> None:
         """Frame k, what is nearer over what is behind it."""
         self.view.set(axes, np.concatenate([s.covers(k) for s in self.shapes]))
-        solids = [s for s in self.shapes if s.facets]
-        others = [s for s in self.shapes if not s.facets]
-        for shape in (*sorted(solids, key=lambda s: s.depth(k)), *others):
-            shape.draw(axes, k, self.view)
+        for shape in in_order(self.shapes, k):
+            self.view.draw(axes, shape, k)
         if self.in_space:
             self.view.axes_of_space(axes, self.shapes[0].seen)
 

@@ -86,17 +86,35 @@ class Box:
     @property
     def axes(self) -> list[Point]:
         """Unit vectors along its sides."""
-        if len(self.center) == 2:
-            angle = sp.sympify(self.rotation or 0)
-            c, s = sp.cos(angle), sp.sin(angle)
-            return [(c, s), (-s, c)]
-        if self.rotation is None:
-            R = sp.eye(3)
-        elif len(self.rotation) == 4:
-            R = rotation_matrix([sp.sympify(e) for e in self.rotation])
-        else:
-            R = sp.Matrix(self.rotation)
-        return [tuple(R[:, k]) for k in range(3)]
+        return axes_of(len(self.center), self.rotation)
+
+
+@dataclass(frozen=True)
+class Frame:
+    """The axes of a frame with that origin, as large as the picture needs them; `rotation` as of a Box."""
+
+    at: Point
+    rotation: Any = None
+
+    @property
+    def axes(self) -> list[Point]:
+        """Unit vectors along them."""
+        return axes_of(len(self.at), self.rotation)
+
+
+def axes_of(dimensions: int, rotation: Any) -> list[Point]:
+    """The columns of a rotation that is an angle [rad] in the plane; in space a matrix or a quaternion."""
+    if dimensions == 2:
+        angle = sp.sympify(rotation or 0)
+        c, s = sp.cos(angle), sp.sin(angle)
+        return [(c, s), (-s, c)]
+    if rotation is None:
+        R = sp.eye(3)
+    elif len(rotation) == 4:
+        R = rotation_matrix([sp.sympify(e) for e in rotation])
+    else:
+        R = sp.Matrix(rotation)
+    return [tuple(R[:, k]) for k in range(3)]
 
 
 @dataclass(frozen=True)
@@ -149,8 +167,10 @@ class Direction:
     vector: Point
 
 
-Shape = Line | Rod | Spring | Disk | Sphere | Box | Ground | Track | Pivot | Arrow | Direction
-SHAPES = (Line, Rod, Spring, Disk, Sphere, Box, Ground, Track, Pivot, Arrow, Direction)
+Shape = (
+    Line | Rod | Spring | Disk | Sphere | Box | Ground | Track | Pivot | Frame | Arrow | Direction
+)
+SHAPES = (Line, Rod, Spring, Disk, Sphere, Box, Ground, Track, Pivot, Frame, Arrow, Direction)
 PIVOTS = ("pin", "sleeve", "plate")  # turns about its axis, slides along it, slides across it
 
 
@@ -168,6 +188,8 @@ def points_of(shape: Shape) -> list[Point]:
         return [shape.point]
     if isinstance(shape, Direction):
         return [shape.vector]
+    if isinstance(shape, Frame):
+        return [shape.at]
     given = (shape.axis,) if isinstance(shape, Pivot) else (shape.along, shape.force)
     return [shape.at, *(p for p in given if p is not None)]
 
@@ -199,7 +221,7 @@ def check_picture(model: ModelFields, problems: list[str]) -> None:
             )
         if isinstance(shape, Arrow):
             _check_arrow(model, shape, what, problems)
-        if isinstance(shape, Box) and not _is_rotation(shape):
+        if isinstance(shape, Box | Frame) and not _is_rotation(shape):
             problems.append(
                 f"{what}: its rotation is {shape.rotation!r}, expected an angle in the plane; in space a "
                 "matrix of 3 rows whose columns are its axes, or a unit quaternion (w, x, y, z)"
@@ -230,9 +252,9 @@ def _is_point(point: object) -> bool:
     )
 
 
-def _is_rotation(box: Box) -> bool:
+def _is_rotation(shape: Box | Frame) -> bool:
     try:
-        return all(map(_is_point, box.axes)) and len(box.size) == len(box.center)
+        return all(map(_is_point, shape.axes)) and len(set(map(len, points_of(shape)))) == 1
     except (TypeError, ValueError, sp.SympifyError):
         return False
 
@@ -253,7 +275,7 @@ def expressions_of(shape: Shape) -> Iterator[Expr]:
     for name in ("radius", "angle", "length"):
         if (value := getattr(shape, name, None)) is not None:
             yield sp.sympify(value)
-    if isinstance(shape, Box):
+    if isinstance(shape, Box | Frame):
         yield from (sp.sympify(x) for axis in shape.axes for x in axis)
     if isinstance(shape, Track):
         yield from (sp.sympify(x) for x in (shape.first, shape.last))

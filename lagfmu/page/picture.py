@@ -27,6 +27,7 @@ from ..model.picture import (
     Box,
     Direction,
     Disk,
+    Frame,
     Ground,
     Line,
     Pivot,
@@ -79,6 +80,7 @@ FIELDS = {  # kind -> names of its points, lists of points, single expressions, 
     "disk": (("center",), (), ("radius", "angle"), ("trace",)),
     "path": (("point",), (), (), ("over", "range")),
     "pivot": (("at", "axis"), (), (), ("of",)),
+    "frame": (("at",), ("axes",), (), ()),
     "arrow": (("at", "vector"), (), (), ("name",)),
     "direction": (("vector",), (), (), ("name",)),
 }
@@ -149,6 +151,8 @@ def _packed(model: Model, shape: Shape, numbers: Mapping[str, Any]) -> dict[str,
             "size": point(shape.size),
             "axes": axes,
         }
+    if isinstance(shape, Frame):
+        return {"kind": kind, "at": point(shape.at), "axes": [point(axis) for axis in shape.axes]}
     if isinstance(shape, Pivot):
         of = {"of": "ball"} if shape.axis is None else {"of": shape.kind, "axis": point(shape.axis)}
         return {"kind": kind, "at": point(shape.at), **of}

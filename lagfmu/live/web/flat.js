@@ -4,6 +4,7 @@ const SVG = "http://www.w3.org/2000/svg";
 const SAMPLES = 120; // points of a path
 const HANGING = 24; // pieces of a slack string
 const HALVINGS = 20; // until its length is found, to a millionth
+const FRAME = 18; // CSS pixels: an axis
 const PIVOT = 7; // half the length of a joint's axis
 
 function svg(tag, attributes = {}) {
@@ -104,6 +105,18 @@ const SHAPES = {
         setLine(mark, [at[0] - x, at[1] + y], [at[0] + x, at[1] - y]);
       } else setCenter(mark, at);
       return [[...at, PIVOT]];
+    },
+  },
+  frame: {
+    make: (s) => s.axes.map((_, k) => svg("line", { class: `frame frame${k}` })),
+    points: (s, look) => [s.at(look)],
+    draw(lines, s, look, view) {
+      const at = view.screen(s.at(look));
+      lines.forEach((line, k) => {
+        const [x, y] = view.flat(s.axes[k](look)).map((c) => c * FRAME);
+        setLine(line, at, [at[0] + x, at[1] - y]);
+      });
+      return [];
     },
   },
   ground: {

@@ -13,6 +13,8 @@ function round125(x) {
   return ten * [1, 2, 5, 10].reduce((best, k) => (Math.abs(Math.log(k * ten / x)) < Math.abs(Math.log(best * ten / x)) ? k : best));
 }
 
+const SPAN = 0.1; // of the size: an axis of a frame
+
 /* Of joints, of that thickness: across their axis and along it. */
 const PIVOTS = { ball: [1.8, 1.8], pin: [1.4, 7], sleeve: [4, 7], plate: [5, 0.6] };
 
@@ -83,6 +85,14 @@ const SOLIDS = {
       const [u, v] = squareTo(axis);
       const sides = [scaled(u, across * THICK * size), scaled(v, across * THICK * size), scaled(axis, half * THICK * size)];
       for (const mark of marks) put(mark, at, sides);
+    },
+  },
+  frame: {
+    make: (kit) => ["curve1", "curve2", "curve0"].map((colour) => kit.veiled("rod", colour)).flat(),
+    place(parts, s, look, size) {
+      const at = s.at(look);
+      const axes = s.axes.map((axis) => axis(look));
+      parts.forEach((part, k) => stick(part, at, along(at, [axes[k >> 1]], SPAN * size), 0.4 * THICK * size));
     },
   },
   arrow: {

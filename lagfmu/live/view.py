@@ -1,0 +1,222 @@
+"""What is seen of moving shapes, and how matplotlib draws them: a film, an icon, a sketch."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from .moving import TOWARDS, Array, Moving
+from .solids import shade
+
+INK, FORCE, FILL, BOB = "#48525e", "#c2410c", "#dbe3ec", "#1f5fa8"
+SOLID = "#c3d2e2"
+FRAME = ("#c2410c", "#1b7a45", "#1f5fa8")  # x, y, z
+LONGEST = 0.2  # of what moves: the arrow of the largest force
+LETTER, LINE = 7.5, 15  # pixels at 100 a inch, of a label
+TINY = 1e-300  # N
+SPAN = 0.08  # of what moves: an axis of a frame
+PIVOT = 0.025  # of what moves: half the length of a joint's axis
+
+
+class View:
+    """What is seen: whatever moves, with room for arrows, and what of the rest is near; the largest force but
+    for spikes."""
+
+    def __init__(self, shapes: Sequence[Moving], labels: bool) -> None:
+        self.labels = labels
+        sizes = [np.asarray(s.length) for s in shapes if s.force is not None]
+        found = np.concatenate(sizes) if sizes else np.ones(1)
+        found = found[np.isfinite(found) & (found > 0)]
+        self.strongest = float(np.quantile(found, 0.98)) if found.size else 1.0
+        scenery = [s for s in shapes if s.kind in ("ground", "line") and not s.moves]
+        seen = [s for s in shapes if s not in scenery]
+        low, high = _box(_reached(seen or scenery))
+        if not (high - low).max() > 0:  # a point: it is seen with what is around it
+            low, high = _box(_reached(shapes))
+        self.size = float(max(*(high - low), 1e-9))
+        tips = [
+            s.points[0]
+            + self.long(s.force, np.minimum(1.0, self.strongest / np.maximum(s.length, TINY)))
+            for s in shapes
+            if s.force is not None
+        ]
+        low, high = _box(np.concatenate([[low, high], *tips]))
+        middle, half = (low + high) / 2, np.maximum((high - low) / 2, 0.2 * self.size)
+        room = (0.12 if labels else 0.07) * self.size
+        self.low, self.high = middle - half - room, middle + half + room
+        if scenery:  # ground that is just beyond
+            near, far = _box(_reached(scenery))
+            self.low = np.where(
+                (near < self.low) & (near > self.low - room), near - room / 2, self.low
+            )
+            self.high = np.where(
+                (far > self.high) & (far < self.high + room), far + room / 2, self.high
+            )
+
+    def long(self, force: Array, part: Any = 1.0) -> Array:
+        """An arrow's way on the picture: of the largest force LONGEST of what moves."""
+        size: float = LONGEST * self.size / self.strongest
+        return np.asarray(force * np.asarray(part)[..., None] * size)
+
+    @property
+    def aspect(self) -> float:
+        """Height over width."""
+        across, up = self.high - self.low
+        return float(up / across)
+
+    def set(self, axes: Any, bodies: Array) -> None:
+        """An empty frame, with what its labels shall not stand on (n, 3)."""
+        axes.clear()
+        axes.set_xlim(self.low[0], self.high[0])
+        axes.set_ylim(self.low[1], self.high[1])
+        axes.set_aspect("equal")
+        axes.set_axis_off()
+        self.taken = bodies
+
+    def draw(self, axes: Any, shape: Moving, k: int) -> None:
+        """Frame k of a shape."""
+        from matplotlib.patches import Circle
+
+        path = np.array([p[k] for p in shape.points])
+        if shape.facets:
+            _solid(axes, shape, k)
+            if shape.shape.get("trace"):
+                center = np.mean([f.mean(axis=1) for f in shape.facets], axis=0)[: k + 1]
+                axes.plot(*shape.seen(list(center.T))[0].T, color=BOB, lw=0.9, alpha=0.6)
+        elif shape.kind == "pivot":
+            way = np.zeros(2) if shape.axis is None else PIVOT * self.size * shape.axis[k]
+            ends = np.array([path[0] - way, path[0] + way])
+            axes.plot(*ends.T, color=BOB, lw=4, solid_capstyle="round")
+        elif shape.kind == "frame":
+            for axis, colour in zip(shape.frame, FRAME, strict=False):
+                ends = np.array([path[0], path[0] + SPAN * self.size * axis[k]])
+                axes.plot(*ends.T, color=colour, lw=1.6)
+        elif shape.kind in ("line", "path"):
+            axes.plot(*path.T, color=INK, lw=1.3)
+        elif shape.kind == "rod":
+            axes.plot(*path.T, color=INK, lw=4.5, solid_capstyle="round")
+            axes.plot(*path.T, "o", color="white", mec=INK, ms=5)
+        elif shape.kind == "spring":
+            axes.plot(
+                *_coil(path[0], path[1], shape.shape["coils"], 0.02 * self.size).T,
+                color=INK,
+                lw=1.3,
+            )
+        elif shape.kind == "ground":
+            axes.plot(*path.T, color=INK, lw=1.8)
+            axes.plot(*_hatch(path[0], path[1], 0.025 * self.size), color=INK, lw=0.7)
+        elif shape.kind == "disk":
+            if shape.shape.get("trace"):
+                axes.plot(*shape.points[0][: k + 1].T, color=BOB, lw=0.9, alpha=0.6)
+            if shape.radius is None:
+                axes.plot(*path.T, "o", color=BOB, ms=9)
+            else:
+                axes.add_patch(Circle(path[0], abs(shape.radius[k]), fc=FILL, ec=INK, lw=1.3))
+                if shape.angle is not None:
+                    a, r = shape.angle[k], shape.radius[k]
+                    spoke = path[0] + r * np.array([np.cos(a), np.sin(a)])
+                    axes.plot(*np.array([path[0], spoke]).T, color=INK, lw=1.3)
+        elif shape.force is not None:
+            self._arrow(axes, shape, k, shape.force[k])
+
+    def _arrow(self, axes: Any, shape: Moving, k: int, force: Array) -> None:
+        at = shape.points[0][k]
+        tip = at + self.long(force)
+        if not np.isfinite(tip).all() or np.hypot(*(tip - at)) < 0.004 * self.size:
+            return
+        style = {"arrowstyle": "-|>", "color": FORCE, "lw": 2, "shrinkA": 0, "shrinkB": 0}
+        axes.annotate("", tip, at, arrowprops=style, annotation_clip=False)
+        if self.labels:
+            self.name(axes, f"{shape.shape['name']} {shape.length[k]:.3g} N", at, tip)
+
+    def name(self, axes: Any, text: str, at: Array, tip: Array) -> None:
+        """A text beside an arrow, where it covers least: beyond the tip, at its sides, behind the foot."""
+        pixel = (self.high[0] - self.low[0]) / axes.bbox.width
+        wide, high = LETTER * len(text) * pixel, LINE * pixel
+        half = np.array([wide, high]) / 2
+        along = (tip - at) / (np.hypot(*(tip - at)) or 1.0)
+        left = np.array([-along[1], along[0]])
+        places = [
+            (tip, along),
+            (tip, -left),
+            (tip, left),
+            ((at + tip) / 2, -left),
+            ((at + tip) / 2, left),
+        ]
+        places += [(at, -along), (at, -left), (at, left)]
+        best = (np.inf, at)
+        for k, (place, way) in enumerate([(p, w * r) for r in (1, 4) for p, w in places]):
+            side = np.where(np.abs(way) < 0.3, 0.0, np.sign(way))
+            middle = place + 6 * pixel * way + side * half
+            middle = np.clip(middle, self.low + half, self.high - half)
+            gaps = np.maximum(np.abs(self.taken[:, :2] - middle) - half, 0.0)
+            depth = np.maximum(self.taken[:, 2] + 3 * pixel - np.hypot(*gaps.T), 0.0).sum()
+            best = min(best, (float(depth) + 0.2 * k * pixel, middle), key=lambda b: b[0])
+        middle = best[1]
+        axes.text(*middle, text, color=FORCE, fontsize=9, ha="center", va="center_baseline")
+        spread = middle[0] + np.linspace(-wide / 2, wide / 2, 6)
+        taken = np.stack([spread, np.full(6, middle[1]), np.full(6, high / 2)], axis=1)
+        self.taken = np.concatenate([self.taken, taken])
+
+    def axes_of_space(self, axes: Any, seen: Callable[[list[Array]], tuple[Array, Array]]) -> None:
+        """The directions of x, y and z, in the corner below on the left."""
+        corner = self.low + 0.08 * self.size
+        for k, letter in enumerate("xyz"):
+            way = seen([np.array([float(i == k)]) for i in range(3)])[0][0] * 0.07 * self.size
+            axes.plot(*np.array([corner, corner + way]).T, color=INK, lw=1)
+            axes.text(
+                *(corner + 1.35 * way), letter, color=INK, fontsize=8, ha="center", va="center"
+            )
+
+
+def _solid(axes: Any, shape: Moving, k: int) -> None:
+    """Those of its facets that are seen, lit from above."""
+    from matplotlib.collections import PolyCollection
+    from matplotlib.colors import to_rgb
+
+    polygons, colours = [], []
+    for facet in (f[k] for f in shape.facets):
+        flat = facet.shape[1] == 2
+        light = 1.0 if flat else shade(facet, TOWARDS)
+        if light is not None:
+            polygons.append(shape.seen(list(facet.T))[0])
+            colours.append(light * np.array(to_rgb(FILL if flat else SOLID)))
+    edges = INK if len(shape.facets) < 7 else colours
+    axes.add_collection(PolyCollection(polygons, facecolors=colours, edgecolors=edges, lw=0.7))
+
+
+def _reached(shapes: Sequence[Moving]) -> Array:
+    reach = []
+    for s in shapes:
+        r = 0 if s.radius is None else np.abs(s.radius)[:, None]
+        reach += [side for p in s.points for side in (p - r, p + r)]
+    return np.concatenate(reach)
+
+
+def _box(points: Array) -> tuple[Array, Array]:
+    points = points[np.isfinite(points).all(axis=1)]
+    return points.min(axis=0), points.max(axis=0)
+
+
+def _coil(a: Array, b: Array, coils: int, width: float) -> Array:
+    along = b - a
+    across = np.array([-along[1], along[0]]) / (np.hypot(*along) or 1.0) * width
+    parts = np.linspace(0.12, 0.88, 2 * coils + 1)
+    sides = [0, *(1 if k % 2 else -1 for k in range(1, 2 * coils)), 0]
+    middle = [a + p * along + s * across for p, s in zip(parts, sides, strict=True)]
+    return np.array([a, *middle, b])
+
+
+def _hatch(a: Array, b: Array, size: float) -> tuple[list[float], list[float]]:
+    length = float(np.hypot(*(b - a))) or 1.0
+    along = (b - a) / length
+    away = size * (np.array([along[1], -along[0]]) - along) / np.sqrt(2)
+    xs: list[float] = []
+    ys: list[float] = []
+    for d in np.arange(size / 2, length, size):
+        start = a + d * along
+        xs += [start[0], start[0] + away[0], np.nan]
+        ys += [start[1], start[1] + away[1], np.nan]
+    return xs, ys
