@@ -43,6 +43,7 @@ from .report.report import report
 from .study.fit.experiment import Experiment
 from .study.fit.result import Fit
 from .study.fit.solve import fit
+from .study.sensitivity.local import sensitivity
 from .study.sweep.sweep import sweep
 from .verification.check import Verification
 from .verification.result import Result
@@ -97,6 +98,7 @@ __all__ = [
     "play",
     "report",
     "rotation_matrix",
+    "sensitivity",
     "show",
     "simulate",
     "sweep",

@@ -101,6 +101,8 @@ from .prepare.prepare import Prepared, prepare
 from .prepare.starts import StartMovedWarning
 from .report import pdf as report_pdf
 from .study.fit import solve as fit_solve
+from .study.sensitivity.local import sensitivity
+from .study.sensitivity.ranges import over_ranges
 from .study.stress import runs, worker
 from .study.stress.bench import Bench, Finding
 from .study.stress.closed_forms import judged, magnitude

@@ -235,6 +235,7 @@ MEANT_WRONG = {  # each command with what cannot be meant
     "sweep": ("MODEL", "--vary", "nothing=1,2"),
     "fit": ("MODEL", "nothing.csv", "--free", "nothing"),
     "report": ("MODEL", "--out", "report.docx"),
+    "sensitivity": ("MODEL", "--of", "nothing"),
 }
 FITTED = ("measured.csv", "--free", "m")
 CANNOT_BE_READ = {  # and with a file that is not there, or is none
@@ -242,6 +243,7 @@ CANNOT_BE_READ = {  # and with a file that is not there, or is none
     "new": ("below/a/file",),
     "sweep": ("FILE", *VARIED),
     "fit": ("FILE", *FITTED),
+    "sensitivity": ("FILE", "--of", "x"),
 }
 
 

@@ -14,6 +14,7 @@ from .commands.new import new
 from .commands.page import page
 from .commands.reference import reference
 from .commands.report import report
+from .commands.sensitivity import sensitivity
 from .commands.show import show
 from .commands.simulate import simulate
 from .commands.stress import stress
@@ -34,6 +35,7 @@ COMMANDS = (
     stress,
     sweep,
     fit,
+    sensitivity,
     report,
 )
 EPILOG = "Exit codes: " + "; ".join(f"{code} {text}" for code, text in EXIT_CODES.items()) + "."

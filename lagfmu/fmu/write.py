@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import importlib.metadata
+import logging
 import os
 import tempfile
 import zipfile
@@ -15,7 +16,7 @@ from types import MappingProxyType
 import numpy as np
 
 from .. import names
-from ..errors import BuildError, SettingError
+from ..errors import BuildError, DerivationError, ModelError, RequestError, SettingError
 from ..interface.further import with_further
 from ..model.closed_form import ClosedForm, Conserved
 from ..model.file import load
@@ -37,6 +38,7 @@ from .face import USUAL, Face
 from .target import NATIVE, target_of
 from .terminals import IN_FMU, terminals
 
+LOG = logging.getLogger("lagfmu")
 SMALLEST_NOMINAL = 1e-30  # what is smaller is no size, but what neither moves nor is pushed
 PAGE = "documentation/index.html"
 LIVE = "documentation/play.html"  # beside it, which has a link to it
@@ -107,10 +109,11 @@ def as_fmu(
     scene: Scene | str | None = None,
     closed_forms: Sequence[ClosedForm | Conserved] = (),
     peaks: Sequence[str] = (),
+    sensitivities: Sequence[str] = (),
 ) -> Iterator[Path]:
     """An FMU as it is; of a model, or a model file, one that is built (natively where a compiler is at hand)
     into a folder that goes again.  `scene`: of a file also by name, else its first.  `peaks`: outputs whose
-    extremes a native FMU that is built shall tell."""
+    extremes a native FMU that is built shall tell; `sensitivities`: see Scene, what it can tell of them."""
     if isinstance(source, Model):
         model, chosen = source, scene if isinstance(scene, Scene) else Scene(source.name)
     else:
@@ -127,10 +130,24 @@ def as_fmu(
         chosen = scene if isinstance(scene, Scene) else file.called(scene)[0]
     kind = target_of()
     with tempfile.TemporaryDirectory(prefix="lagfmu_") as folder:
-        prepared = prepare(model, chosen)
+        prepared = _prepared(model, chosen, sensitivities if kind == NATIVE else ())
         if kind == NATIVE:
             prepared = with_peaks(prepared, peaks)
         yield write(prepared, folder, closed_forms, kind)
+
+
+def _prepared(model: Model, scene: Scene, sensitivities: Sequence[str]) -> Prepared:
+    """With derivatives where the model and the scene have them; else it is said why without."""
+    if sensitivities:
+        try:
+            return prepare(
+                model, replace(scene, sensitivities=(*scene.sensitivities, *sensitivities))
+            )
+        except RequestError:
+            pass  # who asked for names that there are not hears of it from the one who reads them
+        except (ModelError, DerivationError) as error:
+            LOG.info("%s is built without derivatives: %s", scene.name, error)
+    return prepare(model, scene)
 
 
 def with_peaks(prepared: Prepared, wanted: Sequence[str]) -> Prepared:

@@ -1,0 +1,174 @@
+"""`lagfmu sensitivity`: what outputs at the end of a run depend on."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from ...errors import UsageError
+from ..options import InputFile, JsonFile, Settings, StepSize, StopTime, assignments, once
+from ..terminal import console, plainly, say, say_wrote
+
+
+def sensitivity(
+    target: Annotated[Path, typer.Argument(help="An FMU, or a model file.")],
+    of: Annotated[
+        list[str],
+        typer.Option(
+            metavar="OUTPUT,...",
+            help="Outputs at the end of the run, such as departure.surface.time,peak.lambda.rod.max.",
+        ),
+    ],
+    to: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME,...", help="Parameters and start values (default: all)."),
+    ] = None,
+    over: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=LOW:HIGH",
+            help="Indices over ranges instead of derivatives, by SALib; repeatable.",
+        ),
+    ] = None,
+    method: Annotated[
+        str, typer.Option(help="With --over: sobol (parts of the variance) or morris.")
+    ] = "sobol",
+    samples: Annotated[
+        int, typer.Option(help="With --over: of Sobol's plan, or Morris's trajectories.")
+    ] = 256,
+    seed: Annotated[int, typer.Option(help="With --over: of the samples.")] = 0,
+    set_: Settings = None,
+    stop_time: StopTime = None,
+    step_size: StepSize = None,
+    tolerance: Annotated[
+        float | None, typer.Option(help="Relative tolerance of the runs (default 1e-11).")
+    ] = None,
+    inputs: InputFile = None,
+    scene: Annotated[
+        str | None, typer.Option(help="Which FMU of a model file (default: its first).")
+    ] = None,
+    on: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="With --over: a Dask scheduler.")
+    ] = None,
+    json: JsonFile = None,
+    figure: Annotated[
+        Path | None, typer.Option("--plot", help="Write a figure: .svg, .png or .pdf.")
+    ] = None,
+) -> None:
+    """How outputs change with parameters: derivatives at the given values, or indices over ranges."""
+    from ...fmu.read import read_description, units_of
+    from ...fmu.write import write_whole
+    from ...model.selection import listed
+    from ...study.sensitivity.local import ALL, TOLERANCE, made_for
+    from ...study.sensitivity.local import sensitivity as found_by
+    from ...study.sensitivity.ranges import over_ranges
+    from ...verification.junit import text_of
+    from ...verification.reference import read_table
+
+    outputs = [n for text in of for n in listed(text)]
+    by = [n for text in to or () for n in listed(text)] or ALL
+    with plainly(), made_for(target, outputs, by, scene) as fmu:
+        units = units_of(read_description(fmu).modelVariables)
+        given = assignments(set_, lambda: units)
+        signals = None if inputs is None else read_table(inputs)
+        run: dict[str, Any] = {"stop_time": stop_time, "step_size": step_size, "inputs": signals}
+        found: Any
+        if over:
+            if to or given:
+                raise UsageError(
+                    "--to and --set are for derivatives; --over says itself what varies"
+                )
+            ranges = once(_range(text) for text in over)
+            found = over_ranges(
+                fmu,
+                list(outputs),
+                ranges,
+                method,
+                samples,
+                seed,
+                tolerance=tolerance,
+                on=on,
+                **run,
+            )
+            _print_indices(found)
+        else:
+            if on is not None:
+                raise UsageError("--on is for --over")
+            found = found_by(
+                fmu,
+                outputs,
+                by,
+                start_values=given,
+                tolerance=TOLERANCE if tolerance is None else tolerance,
+                **run,
+            )
+            _print_derivatives(found)
+        if json is not None:
+            write_whole(json, text_of(found.to_dict()).encode())
+            say_wrote(json)
+        if figure is not None:
+            say_wrote(found.plot(figure))
+
+
+def _range(text: str) -> tuple[str, tuple[float, float]]:
+    name, sign, ends = (part.strip() for part in text.partition("="))
+    try:
+        low, high = (float(part) for part in ends.split(":"))
+    except ValueError:
+        sign = ""
+    if not sign or not math.isfinite(low + high):
+        raise UsageError(f"--over {text!r}: expected NAME=LOW:HIGH, finite numbers in SI")
+    return name, (low, high)
+
+
+def _print_derivatives(found: Any) -> None:
+    """A table an output: parameter, relative derivative, derivative, why there is none."""
+    from ...model.units import for_reading
+    from ...page.table import new_table, print_whole
+
+    for i, (output, value) in enumerate(found.values.items()):
+        unit = for_reading(found.units.get(output))
+        title = f"{output} = {value:.9g} {unit} at t = {found.stop_time:g} s"
+        head = ("parameter", "% per %", "derivative", "unit", "remark")
+        table = new_table(title, *head, words=["parameter", "unit"], text=["remark"])
+        for k in found.order(i):
+            name = list(found.points)[k]
+            part, slope = found.relative[i, k], found.derivatives[i, k]
+            table.add_row(
+                name,
+                "" if math.isnan(part) else f"{part:+.6f}",
+                "" if math.isnan(slope) else f"{slope:.9g}",
+                f"{unit or '1'} / {for_reading(found.units.get(name)) or '1'}",
+                found.why.get((output, name), ""),
+            )
+        print_whole(console, table)
+    if not found.own.all():
+        these = "derivatives" if not found.own.any() else f"{int((~found.own).sum())} derivatives"
+        say(
+            f"{these} by central differences of runs, relative step {found.step:.1e}",
+            "note:",
+            "cyan",
+        )
+
+
+def _print_indices(found: Any) -> None:
+    from ...page.table import new_table, print_whole
+    from ...study.sensitivity.ranges import CONFIDENCE, METHODS
+
+    for output, rows in found.indices.items():
+        title = f"{output}: {found.method}, {found.runs} runs"
+        table = new_table(title, "parameter", *METHODS[found.method], words=["parameter"])
+        for name in found.order(output):
+            cells = []
+            for index in METHODS[found.method]:
+                half = rows[name].get(CONFIDENCE.get(index, ""))
+                cells.append(
+                    f"{rows[name][index]:.4g}" + (f" ± {half:.2g}" if half is not None else "")
+                )
+            table.add_row(name, *cells)
+        print_whole(console, table)
+    for output, reason in found.without.items():
+        say(f"{output}: no indices: it {reason}", "note:", "yellow")

@@ -1,0 +1,313 @@
+"""sensitivity(): derivatives of outputs at the end of a run by parameters and start values.
+
+The FMU's own where it has them (`sensitivity.OUTPUT.by.PARAMETER`), else central differences of runs.  Where
+the runs beside each other meet different events no difference is given: it would be none of a derivative.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ... import names
+from ...errors import SettingError, SimulationError
+from ...fmu.inputs import check_inputs, columns_at, jumps
+from ...fmu.read import (
+    Trajectory,
+    communication_points,
+    described_rules,
+    experiment_of,
+    kind_of,
+    obstacle,
+    read_description,
+)
+from ...fmu.session import RefusalError, Session
+from ...fmu.write import as_fmu
+from ...interface.rules import problems_of, unsettable
+from ...model.model import Model
+from ...model.rule import Rule, missing
+from ...model.scene import Scene
+from ...numeric.tolerance import tolerance_problem
+
+Floats = NDArray[np.float64]
+TOLERANCE = 1e-11  # of the runs: their noise limits the differences
+ALL = "all"
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """Derivatives (outputs, parameters) at the end of a run, in the units [output]/[parameter], NaN where
+    there is none; `why`: of each of these the reason; `own`: of each whether the FMU gave it; `values` and
+    `points`: of outputs and parameters, by name; `step`: of differences, relative."""
+
+    name: str
+    stop_time: float
+    values: Mapping[str, float]
+    points: Mapping[str, float]
+    derivatives: Floats
+    why: Mapping[tuple[str, str], str]
+    own: NDArray[np.bool_]
+    units: Mapping[str, str]
+    step: float
+
+    @property
+    def relative(self) -> Floats:
+        """(outputs, parameters): by how many parts in 100 an output grows if a parameter grows by one; NaN
+        where one of them is 0."""
+        above, below = np.array(list(self.points.values())), np.array(list(self.values.values()))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            found = self.derivatives * above[None, :] / below[:, None]
+        found[~np.isfinite(found)] = np.nan
+        found[:, above == 0] = np.nan
+        return np.asarray(found)
+
+    def order(self, output: int) -> list[int]:
+        """Parameters by the size of their relative derivative, the largest first."""
+        part = np.abs(self.relative[output])
+        return sorted(range(len(part)), key=lambda k: -np.nan_to_num(part[k], nan=-1.0))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything, for JSON."""
+        relative = self.relative
+        return {
+            "fmu": self.name,
+            "stop_time": self.stop_time,
+            "outputs": [
+                {
+                    "name": o,
+                    "value": value,
+                    "unit": self.units.get(o, ""),
+                    "by": [
+                        {
+                            "name": p,
+                            "value": point,
+                            "unit": self.units.get(p, ""),
+                            "derivative": float(self.derivatives[i, k]),
+                            "relative": float(relative[i, k]),
+                            "of_the_fmu": bool(self.own[i, k]),
+                            "reason": self.why.get((o, p), ""),
+                        }
+                        for k, (p, point) in enumerate(self.points.items())
+                    ],
+                }
+                for i, (o, value) in enumerate(self.values.items())
+            ],
+        }
+
+    def plot(self, out: Any = None) -> Any:
+        """Bars of the relative derivatives, the longest on top: a matplotlib Figure, or a file `out`."""
+        from .plot import tornado
+
+        bars = [
+            [(list(self.points)[k], float(self.relative[i, k])) for k in self.order(i)]
+            for i in range(len(self.values))
+        ]
+        label = "change of the output by 1 % of the parameter [%]"
+        return tornado(dict(zip(self.values, bars, strict=True)), label, self.name, out)
+
+    def __repr__(self) -> str:
+        lines = [f"{self.name} at t = {self.stop_time:g} s"]
+        for i, (o, value) in enumerate(self.values.items()):
+            lines.append(f"{o} = {value:.6g} {self.units.get(o, '')}".rstrip())
+            for k in self.order(i):
+                p = list(self.points)[k]
+                part, slope = self.relative[i, k], self.derivatives[i, k]
+                text = self.why.get((o, p)) or f"{slope:.6g}"
+                lines.append(f"  {p:24} {'' if np.isnan(part) else f'{part:+.4f}':>9}  {text}")
+        return "\n".join(lines)
+
+
+def sensitivity(
+    source: str | os.PathLike[str] | Model,
+    of: Sequence[str],
+    to: Sequence[str] | str = ALL,
+    *,
+    start_values: Mapping[str, Any] | None = None,
+    stop_time: float | None = None,
+    step_size: float | None = None,
+    tolerance: float = TOLERANCE,
+    inputs: Trajectory | None = None,
+    scene: Scene | str | None = None,
+) -> Sensitivity:
+    """How outputs at the end of a run change with parameters and start values, at the values given.
+
+    `of` names outputs: those that tell of a whole run, as `departure.surface.time` and `peak.lambda.rod.max`,
+    mean most.  `to` names parameters and start values; 'all': every Real one but the solver's.  Raises
+    SettingError with every name that is unknown, SimulationError for a run that fails.
+    """
+    if problem := tolerance_problem(tolerance):
+        raise SettingError(problem)
+    with made_for(source, of, to, scene) as path:
+        description = read_description(path)
+        if text := obstacle(path, description):
+            raise SimulationError(f"{str(path)!r} {text}")
+        rules, given = described_rules(description), dict(start_values or {})
+        variables = {v.name: v for v in description.modelVariables}
+        asked = settable(variables, rules) if to in (ALL, [ALL], (ALL,)) else list(to)
+        _check(variables, rules, of, asked, given)
+        check_inputs(inputs, rules, [n for n, v in variables.items() if v.causality == "input"])
+        experiment = experiment_of(description, stop_time, step_size)
+        points = communication_points(experiment.stop_time, experiment.step_size)
+        with Session(path) as session:
+            runs = _Runs(session, np.union1d(points, jumps(inputs, points)), tolerance, inputs, of)
+            start = {p: float(given.get(p, rules[p].start or 0.0)) for p in asked}
+            return _found(description, runs, of, start, given, rules)
+
+
+@contextlib.contextmanager
+def made_for(
+    source: str | os.PathLike[str] | Model,
+    of: Sequence[str],
+    to: Sequence[str] | str = ALL,
+    scene: Scene | str | None = None,
+) -> Iterator[Path]:
+    """An FMU as it is; of a model, or a model file, one that tells derivatives and extremes among `of`."""
+    by = "*" if to in (ALL, [ALL], (ALL,)) else ",".join(to)
+    plain = [n for n in of if not names.measured(n)]
+    asked = [f"{','.join(plain)}:{by}"] if plain else []
+    peaks = [n for text in of if (n := names.measured(text))]
+    with as_fmu(source, scene, peaks=peaks, sensitivities=asked) as path:
+        yield path
+
+
+def settable(variables: Mapping[str, Any], rules: Mapping[str, Rule]) -> list[str]:
+    """Real parameters and start values, but for the solver's."""
+    return [
+        n
+        for n, v in variables.items()
+        if rules[n].settable
+        and kind_of(v) == "Real"
+        and v.causality != "input"
+        and names.read(n).head != names.SOLVER
+    ]
+
+
+def _check(
+    variables: Mapping[str, Any],
+    rules: Mapping[str, Rule],
+    of: Sequence[str],
+    to: Sequence[str],
+    given: Mapping[str, Any],
+) -> None:
+    outputs = [n for n, v in variables.items() if v.causality == "output" and kind_of(v) == "Real"]
+    problems = problems_of(rules, given)
+    problems += [missing(n, outputs, "is no Real output") for n in of if n not in outputs]
+    problems += [text for n in to if (text := unsettable(rules, n))]
+    problems += [
+        f"{n!r} is a {rules[n].kind}, expected what changes continuously"
+        for n in to
+        if n in rules and rules[n].kind != "Real"
+    ]
+    if not of:
+        problems.append("nothing is asked for, expected names of outputs")
+    if problems:
+        raise SettingError("; ".join(problems))
+
+
+class _Runs:
+    """Runs to the end: the outputs `of` there, what the FMU tells of their derivatives, and its events."""
+
+    def __init__(
+        self,
+        session: Session,
+        points: Floats,
+        tolerance: float,
+        inputs: Trajectory | None,
+        of: Sequence[str],
+    ) -> None:
+        self.session, self.points, self.tolerance = session, points, tolerance
+        self.drive = columns_at(inputs, points, session.rules)
+        self.of = list(of)
+        self.counts = names.those(session.outputs, *names.COUNTS)
+
+    def end(self, values: Mapping[str, Any], more: Sequence[str] = ()) -> dict[str, float]:
+        """The last row.  Raises RefusalError."""
+        read = list(dict.fromkeys([*self.of, *self.counts, *more]))
+        run = self.session.run(
+            self.points.tolist(), values, self.tolerance, read, self.drive, late=True
+        )
+        if run.refusal is not None:
+            raise run.refusal
+        return {n: float(run.rows[n][-1]) for n in read}
+
+    def events(self, row: Mapping[str, float]) -> tuple[float, ...]:
+        """How many of each kind there were."""
+        return tuple(row[n] for n in self.counts)
+
+
+def _found(
+    description: Any,
+    runs: _Runs,
+    of: Sequence[str],
+    start: Mapping[str, float],
+    given: Mapping[str, Any],
+    rules: Mapping[str, Rule],
+) -> Sensitivity:
+    told = {
+        (o, p): n for o in of for p in start if (n := names.name(names.SENSITIVITY, p, o)) in rules
+    }
+    flag = [names.SENSITIVITY_VALID] if told and names.SENSITIVITY_VALID in rules else []
+    try:
+        base = runs.end(given, [*told.values(), *flag])
+    except RefusalError as error:
+        raise SimulationError(f"the run at the given values fails: {error.message}") from None
+    if flag and not base[flag[0]]:
+        told = {}  # from some event on there is none: differences tell what can be told
+    step = runs.tolerance ** (1 / 3)
+    slopes = np.full((len(of), len(start)), np.nan)
+    own = np.zeros(slopes.shape, dtype=bool)
+    why: dict[tuple[str, str], str] = {}
+    for k, (p, point) in enumerate(start.items()):
+        if all((o, p) in told for o in of):
+            for i, o in enumerate(of):
+                slopes[i, k], own[i, k] = base[told[o, p]], True
+            continue
+        column, reason = _difference(runs, base, given, p, point, step, rules[p])
+        for i, o in enumerate(of):
+            if (o, p) in told:
+                slopes[i, k], own[i, k] = base[told[o, p]], True
+            elif reason:
+                why[o, p] = reason
+            else:
+                slopes[i, k] = column[i]
+    units = {v.name: v.unit or "1" for v in description.modelVariables}
+    stop = float(runs.points[-1])
+    values = {o: base[o] for o in of}
+    return Sensitivity(
+        description.modelName, stop, values, dict(start), slopes, why, own, units, step
+    )
+
+
+def _difference(
+    runs: _Runs,
+    base: Mapping[str, float],
+    given: Mapping[str, Any],
+    name: str,
+    point: float,
+    step: float,
+    rule: Rule,
+) -> tuple[Floats, str]:
+    """The slopes (outputs,) by a central difference, one-sided at a bound; or why there are none."""
+    h = step * (abs(point) or 1.0)
+    sides: list[tuple[float, Mapping[str, float]]] = []
+    for value in (point - h, point + h):
+        if rule.problem(value):
+            sides.append((point, base))
+            continue
+        try:
+            sides.append((value, runs.end({**given, name: value})))
+        except RefusalError as error:
+            return np.empty(0), f"the run at {value:.6g} fails: {error.message}"
+    (low, left), (high, right) = sides
+    if low == high:
+        return np.empty(0), "it cannot be changed"
+    if not runs.events(left) == runs.events(right) == runs.events(base):
+        return np.empty(0), "runs beside this one meet other events"
+    return np.array([(right[o] - left[o]) / (high - low) for o in runs.of]), ""
