@@ -23,6 +23,8 @@ from lagfmu.testing import GENERATED
 
 pytestmark = pytest.mark.filterwarnings("ignore::lagfmu.testing.RedundantConstraintWarning")
 SCENARIO = Path(__file__).parent / "scenario.c"
+MADE = (*GENERATED, "interface.c")  # for one FMU alone
+RANDOM = Path(__file__).parent / "random3.c"
 LIVES = {  # steps that reach the event or the singular point in between
     "Hemisphere": 0.07,  # a contact that opens
     "CartPendulum": 0.05,  # an input
@@ -43,6 +45,10 @@ LIVES = {  # steps that reach the event or the singular point in between
     "Normal": 0.07,  # a scene: lambda of the hemisphere alone, numbers for m and g
     "Places": 0.1,  # a scene: coordinates that are only read, nothing is solved for lambda
 }
+FMI3_LIVES = (
+    *("Hemisphere", "CartPendulum", "PendulumAngle", "BouncingBall", "HalfCar", "SlippingSphere"),
+    *("SliderCrank", "Gyroscope", "CrankWithBearingFriction", "Crane"),
+)
 SCENES = {  # FMU, outputs, numbers
     "Normal": ("Hemisphere", ["lambda.surface"], ["m", "g"]),
     "Places": ("PendulumCartesian", ["x", "der(y)", "energy.total"], ["*"]),
@@ -85,15 +91,15 @@ def unpacked(native_fmu, built):
     return get
 
 
-def program(folder: Path, name: str, flags: tuple[str, ...]) -> Path:
-    """scenario.c with the FMU's generated sources and what it holds of the runtime, which is the same for
+def program(folder: Path, name: str, flags: tuple[str, ...], importer: Path = SCENARIO) -> Path:
+    """The importer with the FMU's generated sources and what it holds of the runtime, which is the same for
     every FMU."""
     sources = folder / "sources"
     carried = sorted(p for p in sources.glob("*.c") if p.name != "all.c")
-    held = [p.name for p in carried if p.name not in GENERATED]
-    generated = [str(p) for p in carried if p.name in GENERATED]
+    held = [p.name for p in carried if p.name not in MADE]
+    generated = [str(p) for p in carried if p.name in MADE]
     target = folder / f"{name}_{len(flags)}"
-    linked = objects([SCENARIO, *(RUNTIME_FILES[file] for file in held)], flags)
+    linked = objects([importer, *(RUNTIME_FILES[file] for file in held)], flags)
     command = [compiler(), *FLAGS, *flags, "-Werror", f"-I{sources}", "-o", str(target)]
     run = subprocess.run(
         [*command, *generated, *linked, "-lm"], capture_output=True, text=True, timeout=300
@@ -162,3 +168,55 @@ def test_valgrind_finds_nothing(unpacked, name):
         timeout=300,
     )
     assert run.returncode == 0, run.stderr[-3000:]
+
+
+# ---------------------------------------------------------------------------- FMI 3.0
+
+
+def random_calls(
+    path: Path, flags: tuple[str, ...], lives: int, before: tuple[str, ...] = ()
+) -> None:
+    """random3.c with the FMU behind it."""
+    unpacked_to, description = runs.unpacked(path)
+    made = program(Path(unpacked_to), f"{description.modelName}_random", flags, RANDOM)
+    sizes = description.numberOfContinuousStates, len(description.eventIndicators)
+    count = len(description.modelVariables)
+    exchanged = description.modelExchange is not None
+    clocks = any(v.type == "Clock" for v in description.modelVariables)
+    given = [lives, 400, 0.07, count, *sizes, int(exchanged), int(clocks)]
+    run = subprocess.run(
+        [*before, str(made), description.instantiationToken, *map(str, given)],
+        capture_output=True,
+        text=True,
+        timeout=300,
+        env={"ASAN_OPTIONS": "detect_leaks=1", "UBSAN_OPTIONS": "print_stacktrace=1"},
+    )
+    assert run.returncode == 0, run.stderr[-3000:]
+    assert run.stderr == ""
+    assert int(run.stdout) > 100  # messages: much was refused, and told
+
+
+@pytest.mark.parametrize(
+    "name", of_each_kind(sorted(FMI3_LIVES), kinds=("Hemisphere", "SlippingSphere", "CartPendulum"))
+)
+def test_an_importer_may_call_anything_at_any_time(fmi3_fmu, name):
+    """FMI 3.0: random calls in random lives, within steps too; the sanitizers are silent."""
+    random_calls(fmi3_fmu(name), SANITIZE, 200)
+
+
+def test_clocks_stand_random_calls_too(built):
+    """The same of an FMU with clocks and event mode."""
+    file, scene = scene_of("BouncingBall")
+    random_calls(
+        built(file.model, replace(scene, name="Clocked"), fmi=3, clocks=True), SANITIZE, 200
+    )
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("name", ["Hemisphere", "CartPendulum"])
+def test_valgrind_finds_nothing_in_random_calls(fmi3_fmu, name):
+    """No value is used before it is set, no block is left."""
+    if shutil.which("valgrind") is None:
+        pytest.skip("valgrind is not installed")
+    checked = ("valgrind", "--quiet", "--error-exitcode=99", "--leak-check=full")
+    random_calls(fmi3_fmu(name), (), 30, checked)
