@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shutil
+import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
@@ -107,3 +109,49 @@ def test_ecos_gives_the_numbers_of_fmi_2(native_fmu: Fmu, fmi3_fmu: Fmu) -> None
     for n in read:
         assert found[0][n].tobytes() == found[1][n].tobytes()
     assert found[0][read[2]][-1] > 0.4
+
+
+def test_a_change_of_the_equations_begins_an_integrator_anew(fmi3_fmu: Fmu) -> None:
+    """Model exchange: where the particle leaves, its states stay; they are said to have changed all
+    the same, for fmusim's CVODE goes on from beyond the event otherwise, by the old equations, and fails."""
+    fmi3 = pytest.importorskip("fmuloader.fmi3")
+    path = fmi3_fmu("Hemisphere")
+    description = fmpy.read_model_description(str(path))
+    of = {v.name: v.valueReference for v in description.modelVariables}
+    model = fmi3.Fmi3Slave(path, model_identifier="Hemisphere")
+    model.instantiate_model_exchange("hemisphere", instantiation_token=description.guid)
+    model.enter_initialization_mode(start_time=0.0)
+    model.exit_initialization_mode()
+    while model.update_discrete_states().discrete_states_need_update:
+        pass
+    model.enter_continuous_time_mode()
+    beyond = 0.85  # rad: cos theta < 2/3
+    speed = np.sqrt(2 * G * (np.cos(THETA) - np.cos(beyond)))
+    model.set_time(1.65)
+    model.set_continuous_states([1.0, 0.0, beyond, speed])
+    model.enter_event_mode()
+    assert model.update_discrete_states().values_of_continuous_states_changed
+    assert model.get_boolean([of["contact.surface"]]) == [False]
+    assert model.get_continuous_states(4) == [1.0, 0.0, beyond, speed]
+    assert not model.update_discrete_states().values_of_continuous_states_changed
+    model.terminate()
+    model.free_instance()
+
+
+@pytest.mark.parametrize(
+    "way", ["cs", "cs --event-mode-used --early-return-allowed", "me --solver cvode"]
+)
+def test_fmusim_finds_the_departure(fmi3_fmu: Fmu, tmp_path: Path, way: str) -> None:
+    """fmusim (Reference-FMUs, to be built from its sources), where it is on the path."""
+    program = shutil.which("fmusim")
+    if program is None:
+        pytest.skip("fmusim is not on the path")
+    table = tmp_path / "out.csv"
+    settings = "--tolerance 1e-10 --output-interval 0.1 --output-variable departure.surface.time"
+    command = [program, "--interface-type", *way.split(), *settings.split()]
+    command += ["--output-file", str(table), str(fmi3_fmu("Hemisphere"))]
+    run = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert run.returncode == 0, run.stdout + run.stderr
+    rows = np.genfromtxt(table, delimiter=",", names=True)
+    assert rows["time"][-1] == 2.0
+    assert abs(rows["departuresurfacetime"][-1] - departure()) < 1e-8

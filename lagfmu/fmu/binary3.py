@@ -6,10 +6,11 @@ then the events at the end of a step are gone through here, and what is read is 
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from fmpy.fmi3 import FMU3Slave
+from fmpy.fmi3 import FMU3Slave, fmi3Boolean, fmi3Float64
 
 CALLS = {  # what only has another name
     "getReal": "getFloat64",
@@ -29,6 +30,9 @@ class Slave3(FMU3Slave):  # type: ignore[misc]
         self.long = {int(v.valueReference) for v in variables if v.type == "Enumeration"}
         self.clocked = any(v.type == "Clock" for v in variables)
         self.experiment: tuple[Any, ...] = (None, 0.0, None)
+        # of a step: whether an event is to be handled, the end is asked for, it ended early; the time [s]
+        self.told = fmi3Boolean(), fmi3Boolean(), fmi3Boolean(), fmi3Float64()
+        self.places = tuple(map(ctypes.byref, self.told))
 
     def begin(self, log: Callable[..., None], on: bool) -> None:
         """Instantiate; `log` is called as fmi3LogMessageCallback is."""
@@ -69,8 +73,8 @@ class Slave3(FMU3Slave):  # type: ignore[misc]
 
     def doStep(self, time: float, size: float) -> None:
         """A communication step [s], events at its end included."""
-        event, *_ = super().doStep(time, size)
-        if event:
+        self.fmi3DoStep(self.component, time, size, True, *self.places)
+        if self.told[0].value:
             self.enterEventMode()
             self._go_through_events()
 

@@ -163,6 +163,7 @@ static Status pass_event(Instance *x) {
     if (release(x, 0) != OK) return FAILED;
     if (settle_jumps(x, &jumped) != OK || project(x) != OK || choose_rows(x) != OK) return FAILED;
     if (find_happened(x, &any) != OK) return FAILED;
+    if (any || jumped) x->moved = 1; /* some integrators begin anew only then, from beyond the event if they do not */
     if (!any && !(jumped && s->system->contacts + s->system->frictions > 0)) return OK;
     x->evaluated = 0;
     if (s->system->frictions > 0 &&
