@@ -42,6 +42,17 @@ class ClosedFunction(sp.Function):  # type: ignore[misc]
         made: ClosedFunction = sp.Expr.__new__(cls, *map(sp.sympify, args))
         return made
 
+    @property
+    def free_symbols(self) -> set[Expr]:
+        """Found once."""
+        return set(_symbols(self))
+
+    def _xreplace(self, rule: Any) -> tuple[Expr, bool]:
+        """Most rules hold nothing of what it is of."""
+        if self in rule:
+            return rule[self], True
+        return super()._xreplace(rule) if any(e in rule for e in _inside(self)) else (self, False)
+
     @abstractmethod
     def opened(self) -> Expr:
         """One level further down: in elements of rotation matrices, or as a polynomial."""
@@ -57,6 +68,17 @@ class ClosedFunction(sp.Function):  # type: ignore[misc]
     def _eval_derivative(self, s: Expr) -> Expr:
         along = self.changed(lambda x: x.diff(s))
         return self.opened().diff(s) if along.has(AttitudeChange, CarriedChange) else along
+
+
+@lru_cache(maxsize=65536)
+def _inside(e: Expr) -> frozenset[Expr]:
+    """All expressions in its arguments."""
+    return frozenset().union(*map(sp.preorder_traversal, e.args))
+
+
+@lru_cache(maxsize=65536)
+def _symbols(e: Expr) -> frozenset[Expr]:
+    return frozenset().union(*(a.free_symbols for a in e.args))
 
 
 class Attitude(ClosedFunction):

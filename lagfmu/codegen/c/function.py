@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import count, groupby
+from itertools import count
 from textwrap import wrap
 
 import sympy as sp
@@ -18,8 +18,8 @@ from sympy.logic.boolalg import Boolean
 from ...model.attitude import ClosedFunction
 from ...model.closing import Closing
 from ...model.elements import Expr
+from ..alike import DATA, Kind, data_of, kinds, nodes_of, runs
 from ..parts import Value
-from .alike import DATA, Kind, kinds, nodes_of
 from .closed import calls
 from .printer import POWER, Printer
 from .subexpressions import Names, common_subexpressions
@@ -75,12 +75,7 @@ def _in_loops(
     names: Mapping[Expr, str],
 ) -> str:
     """A function for each kind of what is alike, one for the rest, and one that calls them."""
-    told = {
-        (array, place)
-        for kind in found
-        for targets in kind.targets
-        for array, place in zip(kind.writes, targets, strict=True)
-    }
+    told = {place for kind in found for place in kind.told}
     rest = {
         array: [None if (array, k) in told else value for k, value in enumerate(group)]
         for array, group in results.items()
@@ -94,7 +89,7 @@ def _in_loops(
     elif blocks:
         text = _define(f"{name}_rest", arguments, list(results), statements, names)
         parts.append(f"/* {head} */\n{text}")
-    data = {x: k for k, x in enumerate(dict.fromkeys(_data(found)))}
+    data = {x: k for k, x in enumerate(dict.fromkeys(data_of(found)))}
     text, parameters = _constants(data, arguments, names)
     calls = text
     if blocks:
@@ -112,13 +107,6 @@ def _in_loops(
     silence = _silence([a for a in (*arguments, *results) if a not in used])
     signature = _signature(name, arguments, names, list(results))
     return "\n".join([*parts, f"/* {doc} */\n{signature}{silence}{calls}}}\n"])
-
-
-def _data(found: Sequence[Kind]) -> Iterator[Expr]:
-    """The sources in DATA."""
-    for kind in found:
-        for source in kind.sources:
-            yield from (x for x, a in zip(source, kind.reads, strict=True) if a == DATA)
 
 
 def _constants(
@@ -156,24 +144,17 @@ def _loop(
         )
     )
     gather = scatter = ""
-    for array, first, end in _runs(kind.reads):
+    for array, first, end in runs(kind.reads):
         scalar = array != DATA and _scalar(array, arguments[array], names)
         source = array if scalar else f"{array}[from[k][j]]"
         gather += f"            for (int j = {first}; j < {end}; j++) a[j] = {source};\n"
-    for array, first, end in _runs(kind.writes):
+    for array, first, end in runs(kind.writes):
         scatter += f"            for (int j = {first}; j < {end}; j++) {array}[to[k][j]] = y[j];\n"
     return (
         f"    {{\n{tables}        for (int k = 0; k < {count}; k++) {{\n"
         f"            double a[{inputs}], y[{outputs}];\n{gather}            {title}(a, y);\n"
         f"{scatter}        }}\n    }}\n"
     )
-
-
-def _runs(arrays: Sequence[str]) -> Iterator[tuple[str, int, int]]:
-    """Each array with the first place of its run and the one after its last."""
-    for array, group in groupby(enumerate(arrays), key=lambda pair: pair[1]):
-        places = [k for k, _ in group]
-        yield array, places[0], places[-1] + 1
 
 
 def _define(

@@ -16,6 +16,7 @@ from ...numeric.cubic import Cubic
 from ...numeric.system import System
 from ..parts import Function, Parts, parts_of
 from .function import function, identifiers, table_name
+from .loops import in_loops
 
 
 def source(form: Form) -> str:
@@ -87,7 +88,9 @@ def _names(*groups: Sequence[Expr]) -> dict[Expr, str]:
 
 def _define(f: Function, names: Mapping[Expr, str], prefix: str = "") -> str:
     results = {label: [x.expression for x in group] for label, group in f.results.items()}
-    return function(prefix + f.name, f.doc, f.arguments, results, names)
+    return in_loops(f, names, prefix) or function(
+        prefix + f.name, f.doc, f.arguments, results, names
+    )
 
 
 def _embedding(parts: Parts) -> list[str]:

@@ -30,7 +30,7 @@ ARGUMENTS = (
 TABLE = "table_of_"
 
 
-class _Printer(PythonCodePrinter):  # type: ignore[misc]
+class Printer(PythonCodePrinter):  # type: ignore[misc]
     """Numbers as doubles, functions without the module's name; unknown functions are refused."""
 
     def __init__(self, names: Mapping[Expr, str]) -> None:
@@ -100,7 +100,7 @@ def function(
     taken = {*names.values(), *ARGUMENTS}
     closing = Closing(lambda letter: _array(letter, taken))
     flat, places = closing.opened(flat)
-    printer = _Printer({**names, **{s: f"{a}[{k}]" for s, (a, k) in places.items()}})
+    printer = Printer({**names, **{s: f"{a}[{k}]" for s, (a, k) in places.items()}})
     common, reduced = sp.cse(flat, symbols=_fresh(taken), order="none", list=True)
     lines = [f"def {name}({', '.join(arguments)}):", f'    """{doc}"""']
     for argument, symbols in arguments.items():

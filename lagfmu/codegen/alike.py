@@ -1,4 +1,4 @@
-"""What is alike up to the names of its symbols is computed by one C function: bodies and joints of a kind.
+"""What is alike up to the names of its symbols is computed by one function: bodies and joints of a kind.
 
 The values of one owner (a joint A with the rows A.x, A.y, ...; a body) are written in symbols that are
 numbered by their places in the arguments, with vectors that are fixed on bodies as data (model/alike.py).
@@ -10,14 +10,15 @@ for each further joint.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import groupby
 from typing import Any
 
-from ...model.alike import pattern
-from ...model.elements import Expr
-from ...names import read
-from ..parts import Arguments, Value
+from ..model.alike import pattern
+from ..model.elements import Expr
+from ..names import read
+from .parts import Arguments, Value
 
 SMALL = 60  # different nodes of one owner's values that are not worth a function
 DATA = "data"
@@ -37,6 +38,11 @@ class Kind:
     owners: list[str] = field(default_factory=list)
     sources: list[tuple[Any, ...]] = field(default_factory=list)
     targets: list[tuple[int, ...]] = field(default_factory=list)
+
+    @property
+    def told(self) -> set[tuple[str, int]]:
+        """The array and the place of each value that it writes."""
+        return {pair for target in self.targets for pair in zip(self.writes, target, strict=True)}
 
 
 def kinds(
@@ -88,6 +94,20 @@ def _with_numbers(kind: Kind) -> Kind:
         reads=tuple(kind.reads[j] for j in kept),
         sources=[tuple(source[j] for j in kept) for source in kind.sources],
     )
+
+
+def data_of(found: Sequence[Kind]) -> Iterator[Expr]:
+    """The sources in DATA."""
+    for kind in found:
+        for source in kind.sources:
+            yield from (x for x, a in zip(source, kind.reads, strict=True) if a == DATA)
+
+
+def runs(arrays: Sequence[str]) -> Iterator[tuple[str, int, int]]:
+    """Each array with the first place of its run and the one after its last."""
+    for array, group in groupby(enumerate(arrays), key=lambda pair: pair[1]):
+        places = [k for k, _ in group]
+        yield array, places[0], places[-1] + 1
 
 
 def nodes_of(e: Expr, seen: Mapping[Expr, None]) -> dict[Expr, None]:
