@@ -315,6 +315,25 @@ def test_dependencies_say_of_what_kind_they_are(xml):
                 assert kind == ("constant" if own else "dependent")
 
 
+def test_dependencies_are_left_out_where_they_would_be_too_many(tmp_path, monkeypatch, caplog):
+    """In a large mechanism all depends on all: no attribute `dependencies`, which means that for FMI, and the
+    build says so."""
+    x, m = dynamicsymbols("x"), symbols("m", positive=True)
+    parameters = [Parameter(m, 1.0, "kg")]
+    free = Model(
+        "Free", lagrangian=m * x.diff() ** 2 / 2, coordinates={x: "m"}, parameters=parameters
+    )
+    caplog.set_level("INFO", "lagfmu")
+    for most, told in ((100, 0), (3, 1)):
+        monkeypatch.setattr("lagfmu.fmu.described.MOST", most)
+        path = build_fmu(free, tmp_path, target="python", check=False)
+        with zipfile.ZipFile(path) as archive:
+            text = archive.read("modelDescription.xml").decode()
+        assert ("dependencies=" in text) == (not told)
+        assert validate_fmu(str(path)) == []
+        assert sum("leaves out `dependencies`" in line for line in caplog.messages) == told
+
+
 def test_the_model_says_who_made_it(tmp_path):
     """author, version, license and copyright of a Model stand in the description; none are invented."""
     x, m = dynamicsymbols("x"), symbols("m", positive=True)

@@ -8,9 +8,11 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import sympy as sp
+from sympy.core.function import AppliedUndef
 from sympy.physics.vector import dynamicsymbols
 
 from ..model.elements import (
@@ -179,11 +181,15 @@ class Draft:
 
     def second(self, f: Timed) -> Expr:
         """The second derivative: the bend, and the rate, which is linear in the speeds, of accelerations."""
-        changes: dict[Expr, Expr] = {}
-        for motion in self.motions.values():
-            speeds = [q.diff(TIME) for q in motion.coordinates if q not in motion.kinematics]
-            changes |= {v: v.diff(TIME) for v in (*speeds, *motion.speeds) if f.rate.has(v)}
-        return f.bend + f.rate.xreplace(changes)
+        moving = f.rate.atoms(sp.Derivative, AppliedUndef) & self._speeds
+        return f.bend + f.rate.xreplace({v: v.diff(TIME) for v in moving})
+
+    @cached_property
+    def _speeds(self) -> set[Expr]:
+        """Of all bodies."""
+        own = {v for m in self.motions.values() for v in m.speeds}
+        directions = (q for m in self.motions.values() for q in m.directions)
+        return own | {q.diff(TIME) for q in directions if q not in own}
 
     @property
     def known(self) -> set[str]:

@@ -15,6 +15,7 @@ DISPLAYED = {  # unit -> type and what it is shown in, times 180/pi
     "rad/s2": ("AngularAcceleration", "deg/s2"),
 }
 METHOD = "Method"
+MOST = 100_000  # dependencies that are told: two megabytes of XML
 HOW = "How the equations of motion are integrated"
 
 
@@ -95,10 +96,12 @@ class Unknown:
     """One of the structure, and what it depends on."""
 
     name: str
-    known: Sequence[str]
+    known: Sequence[str] | None  # None: not told, which means on all
 
     def attributes(self, places: Mapping[str, int]) -> dict[str, str]:
         """Dependencies and their kinds, by the numbers in `places`; what is not there is not known."""
+        if self.known is None:
+            return {}
         known = sorted(
             (places[n], "constant" if n == self.name else "dependent")
             for n in self.known
@@ -116,9 +119,27 @@ class Structure:
     derivatives: Sequence[Unknown]
     initial: Sequence[Unknown]
 
+    @property
+    def entries(self) -> int:
+        """How many dependencies there are."""
+        groups = self.outputs, self.derivatives, self.initial
+        return sum(len(u.known or ()) for group in groups for u in group)
+
+    @property
+    def short(self) -> Structure:
+        """Without them."""
+        groups = self.outputs, self.derivatives, self.initial
+        return Structure(*([Unknown(u.name, None) for u in group] for group in groups))
+
 
 def structure_of(table: VariableTable) -> Structure:
-    """Outputs and derivatives at communication points, and what is found at the start."""
+    """Outputs and derivatives at communication points, and what is found at the start; of large mechanisms,
+    in which all depends on all, without what they depend on."""
+    found = _whole(table)
+    return found if found.entries <= MOST else found.short
+
+
+def _whole(table: VariableTable) -> Structure:
     moving = {*table.states, *table.derivatives}  # listed even where they are local
     return Structure(
         [Unknown(v.name, v.depends) for v in table.outputs],
@@ -129,4 +150,14 @@ def structure_of(table: VariableTable) -> Structure:
             if (v.causality == "output" or v.name in moving)
             and v.initial in ("approx", "calculated")
         ],
+    )
+
+
+def untold(table: VariableTable) -> str:
+    """That dependencies are left out, to be said; nothing where they stand there."""
+    if (entries := _whole(table).entries) <= MOST:
+        return ""
+    return (
+        f"modelDescription.xml leaves out `dependencies`, which would be {entries} entries, more than "
+        f"{MOST}: each output may depend on all states and inputs"
     )

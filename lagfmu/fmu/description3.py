@@ -101,7 +101,11 @@ def dependencies(table: VariableTable) -> tuple[Dependencies, Dependencies]:
     found, places = structure_of(table), table.position
     running = [*found.outputs, *found.derivatives, *_indicators(table)]
     of_start, of_running = (
-        {places[u.name]: sorted(places[n] for n in u.known if n in places) for u in unknowns}
+        {
+            places[u.name]: sorted(places[n] for n in u.known if n in places)
+            for u in unknowns
+            if u.known is not None
+        }
         for unknowns in (found.initial, running)
     )
     return of_start, of_running

@@ -34,6 +34,7 @@ from .archive import pack
 from .capabilities import offers_exchange
 from .closed_forms import pack_closed_forms
 from .compiler import HOST
+from .described import untold
 from .face import USUAL, Face
 from .target import NATIVE, target_of
 from .terminals import IN_FMU, terminals
@@ -70,6 +71,8 @@ def write(
     check_given(prepared.model.name, moved, missed)
     tell(moved)
     prepared = as_built(prepared, target, face)
+    if said := untold(prepared.table):
+        LOG.info(said)
     extra = {
         PAGE: page(prepared, choice, bool(live)).encode(),
         "resources/lagfmu.json": pack_closed_forms(

@@ -200,18 +200,20 @@ def _expressions(model: ModelFields) -> list[tuple[str, Expr]]:
 
 
 def _check_symbols(model: ModelFields, problems: list[str]) -> None:
-    moving = {*model.coordinates, *model.speeds}
+    moving, directions = {*model.coordinates, *model.speeds}, {*model.directions}
+    pfaffian = {f"constraint {c.name!r}" for c in model.constraints if isinstance(c, Nonholonomic)}
+    known = known_symbols(model)
     for q in model.forces:
         if q in model.kinematics:
             problems.append(
                 f"a force is given on {plain(q)}, which moves by `kinematics`: give it on the speeds"
             )
-        elif q not in model.directions:
+        elif q not in directions:
             problems.append(f"a force is given on {plain(q)}, which is no coordinate of the model")
     for what, expression in _expressions(model):
         problems += _solved_for(what, expression)
-        problems += undeclared(model, what, expression, reactions_in(expression))
-        if what.startswith("constraint") and not expression.has(*moving):
+        problems += undeclared(model, what, expression, reactions_in(expression), known)
+        if what.startswith("constraint") and symbols_in(expression).isdisjoint(moving):
             problems.append(
                 f"{what}: {expression} holds no coordinate, expected a condition on the motion: "
                 "correct it or leave it out"
@@ -219,8 +221,8 @@ def _check_symbols(model: ModelFields, problems: list[str]) -> None:
         orders = [
             d.derivative_count + (d.expr in model.speeds) for d in expression.atoms(sp.Derivative)
         ]
-        orders += [1 for w in model.speeds if expression.has(w)]
-        limit = 0 if what.startswith("constraint") and not _pfaffian(model, what) else 1
+        orders += [1 for w in expression.atoms(AppliedUndef) if w in model.speeds]
+        limit = 0 if what.startswith("constraint") and what not in pfaffian else 1
         if any(order > limit for order in orders):
             problems.append(
                 f"{what}: holds a derivative of order {max(orders)}, expected at most {limit}"
@@ -228,11 +230,11 @@ def _check_symbols(model: ModelFields, problems: list[str]) -> None:
             )
     if model.embedding is not None:
         for q, phi in model.embedding.relations.items():
-            known = known_symbols(model) - moving | set(model.embedding.coordinates)
+            independent = known - moving | set(model.embedding.coordinates)
             problems += [
                 f"embedding of {plain(q)}: {name} is neither an independent coordinate nor a "
                 "parameter"
-                for name in sorted(map(plain, symbols_in(phi) - known))
+                for name in sorted(map(plain, symbols_in(phi) - independent))
             ]
 
 
@@ -244,12 +246,6 @@ def _solved_for(what: str, expression: Expr) -> list[str]:
         "to read is an Output in `outputs`"
         for symbol in reactions_in(expression)
     ]
-
-
-def _pfaffian(model: ModelFields, what: str) -> bool:
-    return any(
-        isinstance(c, Nonholonomic) and what == f"constraint {c.name!r}" for c in model.constraints
-    )
 
 
 def declared_units(model: ModelFields, problems: list[str]) -> dict[Expr, Unit]:

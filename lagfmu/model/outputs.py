@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 
 import sympy as sp
 from sympy.physics.vector import dynamicsymbols
@@ -10,7 +10,7 @@ from sympy.physics.vector import dynamicsymbols
 from ..names import MULTIPLIER, read
 from .elements import Contact, Expr, ModelFields, Nonholonomic, Peak, name_of
 from .reactions import force_of_constraint, multiplier, reaction_units, reactions_in
-from .symbols import undeclared
+from .symbols import known_symbols, undeclared
 from .units import Unit, check_dimension, declared_unit, plain
 
 HIGHEST = 2  # order of a derivative
@@ -24,6 +24,9 @@ def check_outputs(model: ModelFields, problems: list[str]) -> None:
         if not isinstance(peak, Peak) or not isinstance(peak.of, str) or not peak.of
     ]
     constraints = {c.name for c in model.constraints}
+    reactions = {multiplier(name) for name in constraints}
+    reactions |= {force_of_constraint(q) for q in model.directions}
+    known = known_symbols(model)
     for o in model.outputs:
         what = f"output {o.name!r}"
         if o.unique and o.name in constraints:
@@ -32,7 +35,8 @@ def check_outputs(model: ModelFields, problems: list[str]) -> None:
                 "rename one"
             )
         for expression in (o.expression, 0 if o.otherwise is None else o.otherwise):
-            problems += _unknown(model, what, sp.sympify(expression))
+            problems += undeclared(model, what, expression, reactions_in(expression), known)
+            problems += _unknown(model, what, sp.sympify(expression), reactions)
         if o.otherwise is None:
             problems += _undefined(model, what, sp.sympify(o.expression))
 
@@ -50,13 +54,12 @@ def check_output_units(model: ModelFields, units: Mapping[Expr, Unit], problems:
             problems += check_dimension(sp.sympify(o.otherwise), unit, known, f"{what}, otherwise")
 
 
-def _unknown(model: ModelFields, what: str, expression: Expr) -> Iterator[str]:
-    yield from undeclared(model, what, expression, reactions_in(expression))
-    constraints = [c.name for c in model.constraints]
-    reactions = {multiplier(c) for c in constraints}
-    reactions |= {force_of_constraint(q) for q in model.directions}
+def _unknown(
+    model: ModelFields, what: str, expression: Expr, reactions: Collection[Expr]
+) -> Iterator[str]:
     for symbol in reactions_in(expression):
         if symbol not in reactions:
+            constraints = [c.name for c in model.constraints]
             kind = "constraint" if read(str(symbol)).quantity == MULTIPLIER else "coordinate"
             known_names = constraints if kind == "constraint" else map(name_of, model.directions)
             yield (
@@ -67,8 +70,9 @@ def _unknown(model: ModelFields, what: str, expression: Expr) -> Iterator[str]:
 
 
 def _derivatives(model: ModelFields, what: str, expression: Expr) -> Iterator[str]:
-    prescribed = {i.symbol for i in model.prescribed}
-    for d in sorted(expression.atoms(sp.Derivative), key=str):
+    found = sorted(expression.atoms(sp.Derivative), key=str)
+    prescribed = {i.symbol for i in model.prescribed} if found else set()
+    for d in found:
         highest = HIGHEST - (d.expr in model.speeds)
         if d.derivative_count > highest:
             yield (

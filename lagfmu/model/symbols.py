@@ -19,13 +19,19 @@ def known_symbols(model: ModelFields) -> set[Expr]:
 
 
 def undeclared(
-    model: ModelFields, what: str, expression: Expr, also: Collection[Expr] = ()
+    model: ModelFields,
+    what: str,
+    expression: Expr,
+    also: Collection[Expr] = (),
+    known: Collection[Expr] = (),
 ) -> list[str]:
-    """The symbols of an expression that are none of the model's, nor `also`, each with the remedy."""
-    known = known_symbols(model)
-    names = {name_of(s) for s in known}
+    """The symbols of an expression that are none of the model's, nor `also`, each with the remedy.  `known`:
+    those of the model, where many expressions are asked about."""
+    known = known or known_symbols(model)
+    others = symbols_in(expression).difference(known, also)
+    names = {name_of(s) for s in known} if others else set()
     problems = []
-    for symbol in sorted(symbols_in(expression) - known - set(also), key=lambda s: str(plain(s))):
+    for symbol in sorted(others, key=lambda s: str(plain(s))):
         remedy = "declare it, e.g. as a Parameter with value and unit"
         if model.embedding and symbol in model.embedding.coordinates:
             remedy = "it is one of the embedding: write it by the model's own coordinates"
