@@ -21,7 +21,7 @@ from sympy import Rational, cos, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Contact, Holonomic, Input, Model, Nonholonomic, Parameter, Scene, build_fmu
-from lagfmu.testing import name_of
+from lagfmu.testing import described, name_of
 
 Case = tuple[str, str]  # target, name
 PYTHON = [("python", name) for name in ("CartPendulum", "Hemisphere")]
@@ -325,7 +325,7 @@ def test_dependencies_are_left_out_where_they_would_be_too_many(tmp_path, monkey
     )
     caplog.set_level("INFO", "lagfmu")
     for most, told in ((100, 0), (3, 1)):
-        monkeypatch.setattr("lagfmu.fmu.described.MOST", most)
+        monkeypatch.setattr(described, "MOST", most)
         path = build_fmu(free, tmp_path, target="python", check=False)
         with zipfile.ZipFile(path) as archive:
             text = archive.read("modelDescription.xml").decode()
