@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import MODELS
 from typer.testing import CliRunner
 
 import lagfmu
@@ -44,6 +45,23 @@ def test_data_without_noise_give_the_parameters_back(pendulum, swing):
     found = lagfmu.fit(pendulum, swing, {"L": (0.3, 3.0), "m": None})
     assert found.converged
     assert found.values == pytest.approx(TRUE, rel=1e-8)
+
+
+def test_an_fmu_with_derivatives_takes_no_differences(swing, tmp_path):
+    """The model file with the outputs named is built with derivatives: the same values from a third of the
+    runs, and a clock that is set right besides by differences."""
+    free, measure = {"L": (0.3, 3.0), "m": None}, ["theta", "lambda.rod"]
+    found = lagfmu.fit(MODELS / "pendulum.py", swing, free, measure, scene="PendulumAngle")
+    assert found.own == {"L", "m"}
+    assert found.values == pytest.approx(TRUE, rel=1e-8)
+    assert "derivatives of the FMU" in found.summary()
+    assert "differences" not in found.summary()
+    late = swing | {"time": swing["time"] + 0.01}
+    found = lagfmu.fit(
+        MODELS / "pendulum.py", late, free, measure, offset=0.02, scene="PendulumAngle"
+    )
+    assert found.values == pytest.approx(TRUE | {"offset.experiment 1": 0.01}, rel=1e-6)
+    assert "else differences" in found.summary()
 
 
 def test_what_the_angle_does_not_know_is_said(pendulum, swing):

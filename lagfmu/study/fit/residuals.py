@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ... import names
 from ...errors import SimulationError
 from ...fmu.inputs import columns_at, jumps
 from ...fmu.read import communication_points
@@ -38,6 +39,7 @@ class Residuals:
         self.tolerance, self.step = tolerance, step
         self.difference = tolerance ** (1 / 3)
         self.runs = 0
+        self.own: set[str] = set()
         self.measured = np.concatenate(
             [c[np.isfinite(c)] for s in problem.series for c in s.measured.values()]
         )
@@ -54,27 +56,14 @@ class Residuals:
         return np.concatenate(found)
 
     def jacobian(self, x: Floats, weights: Floats) -> Floats:
-        """The derivatives (points, free), times `weights`, by central differences, one-sided at a bound or
-        beside a run that ends early; what these do not tell from 0 is 0, so that a search leaves it alone.
-         Raises SimulationError where there is a run on neither side."""
-        columns = []
-        for k, f in enumerate(self.problem.free):
-            h = self.difference * max(abs(x[k]), 1e-3 * f.scale(x[k]))
-            sides = []
-            for value in (max(x[k] - h, f.low), min(x[k] + h, f.high)):
-                moved = np.array(x)
-                moved[k] = value
-                try:
-                    sides.append((value, self.at(moved)))
-                except RefusalError as error:
-                    refusal = error
-            if len(sides) == 1:
-                sides.append((x[k], self.at(x)))
-            if len(sides) < 2 or sides[0][0] == sides[1][0]:
-                raise SimulationError(
-                    f"the run at {f.name} = {x[k]!r} has no neighbours: {refusal.message}"
-                )
-            columns.append((sides[1][1] - sides[0][1]) / (sides[1][0] - sides[0][0]))
+        """The derivatives (points, free), times `weights`: the FMU's own where it has them, else central
+        differences, one-sided at a bound or beside a run that ends early.  What these do not tell from 0 is
+        0, so that a search leaves it alone.  Raises SimulationError where there is a run on neither side."""
+        told = self._told(x)
+        columns = [
+            told[f.name] if f.name in told else self._difference(x, k)
+            for k, f in enumerate(self.problem.free)
+        ]
         found = np.column_stack(columns) * weights[:, None]
         scale = np.array([f.scale(v) for f, v in zip(self.problem.free, x, strict=True)])
         left, size, right = np.linalg.svd(found * scale, full_matrices=False)
@@ -83,12 +72,52 @@ class Residuals:
         kept[:, np.linalg.norm(kept, axis=0) < self.noise * size[0]] = 0.0
         return np.asarray(kept / scale)
 
+    def _told(self, x: Floats) -> dict[str, Floats]:
+        """The derivatives (points,) by those values by which the FMU tells them of all that was measured,
+        and as long as it does."""
+        rules, outputs = self.session.rules, self.problem.deviations
+        free = [f.name for f in self.problem.free if not f.of]
+        free = [p for p in free if all(_derivative(o, p) in rules for o in outputs)]
+        if not free:
+            return {}
+        found: dict[str, list[Floats]] = {p: [] for p in free}
+        for one in self.problem.series:
+            more = [_derivative(o, p) for p in free for o in one.measured]
+            rows = self._run(one, x, [*more, names.SENSITIVITY_VALID])
+            if not rows[names.SENSITIVITY_VALID].all():
+                return {}
+            for p in free:
+                for o, c in one.measured.items():
+                    found[p].append(rows[_derivative(o, p)][np.isfinite(c)])
+        self.own |= set(free)
+        return {p: np.concatenate(parts) for p, parts in found.items()}
+
+    def _difference(self, x: Floats, k: int) -> Floats:
+        """The derivatives (points,) by free value k."""
+        f = self.problem.free[k]
+        h = self.difference * max(abs(x[k]), 1e-3 * f.scale(x[k]))
+        sides = []
+        for value in (max(x[k] - h, f.low), min(x[k] + h, f.high)):
+            moved = np.array(x)
+            moved[k] = value
+            try:
+                sides.append((value, self.at(moved)))
+            except RefusalError as error:
+                refusal = error
+        if len(sides) == 1:
+            sides.append((x[k], self.at(x)))
+        if len(sides) < 2 or sides[0][0] == sides[1][0]:
+            raise SimulationError(
+                f"the run at {f.name} = {x[k]!r} has no neighbours: {refusal.message}"
+            )
+        return np.asarray((sides[1][1] - sides[0][1]) / (sides[1][0] - sides[0][0]))
+
     @property
     def noise(self) -> float:
         """The part of the largest singular value of a Jacobian that differences do not tell from 0."""
         return float(10 * self.difference**2)
 
-    def _run(self, one: Series, x: Sequence[float] | Floats) -> Any:
+    def _run(self, one: Series, x: Sequence[float] | Floats, more: Sequence[str] = ()) -> Any:
         """The rows at the times of one experiment."""
         own = dict(zip(self.problem.free, x, strict=True))
         values = dict(self.given) | dict(one.values)
@@ -105,8 +134,12 @@ class Residuals:
             times = np.array([0.0, self.step])
         self.runs += 1
         run = self.session.run(
-            times.tolist(), values, self.tolerance, list(one.measured), drive, late=True
+            times.tolist(), values, self.tolerance, [*one.measured, *more], drive, late=True
         )
         if run.refusal is not None:
             raise run.refusal
         return run.rows[np.searchsorted(times, wanted)]
+
+
+def _derivative(output: str, by: str) -> str:
+    return names.name(names.SENSITIVITY, by, output)

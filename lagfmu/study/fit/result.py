@@ -24,7 +24,8 @@ EXPLAINED = (
 class Fit:
     """`x` (free,) in SI units and the `certainty` of it; `deviations` of each measured output, given or
     estimated; `predicted` and `measured` (points,), `of` which output each is; `cost` half the sum of squares
-    in deviations (with its loss); `runs` of the FMU, and the relative `difference` for derivatives."""
+    in deviations (with its loss); `runs` of the FMU, and the relative `difference` for derivatives, but by
+    those that are its `own`."""
 
     name: str
     problem: Problem
@@ -38,6 +39,7 @@ class Fit:
     cost: float
     runs: int
     difference: float
+    own: frozenset[str] = frozenset()
 
     @property
     def values(self) -> dict[str, float]:
@@ -194,6 +196,7 @@ class Fit:
             "cost": self.cost,
             "runs": self.runs,
             "difference": self.difference,
+            "derivatives_of_the_fmu": sorted(self.own),
             "remarks": self.remarks(),
             "residuals": {
                 e: {
@@ -225,8 +228,14 @@ class Fit:
         count = len(self.problem.series)
         return (
             f"{self.name}: {len(self.measured)} measured numbers of {count} experiment{'s' * (count > 1)}, "
-            f"{self.runs} runs, differences of {self.difference:.1g}"
+            f"{self.runs} runs, {self._derivatives()}"
         )
+
+    def _derivatives(self) -> str:
+        by = f"differences of {self.difference:.1g}"
+        if not self.own:
+            return by
+        return "derivatives of the FMU" + ("" if len(self.own) == len(self.x) else f", else {by}")
 
 
 def _digits(value: float, error: float) -> int:

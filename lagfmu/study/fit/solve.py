@@ -60,7 +60,9 @@ def fit(
     deviations.
     `step_size` [s]: pieces in which inputs are handed over.
 
-    Derivatives are central differences of runs at the relative `tolerance`, with a step of its third root.
+    Derivatives are the FMU's own where it has them (`sensitivity.*`; a model whose outputs are named in
+    `measure` is built with them), else central differences of runs at the relative `tolerance`, with a step
+    of its third root.
     Raises SettingError with all that is wrong with what was given, SimulationError for a first run that
     fails.
     """
@@ -70,7 +72,8 @@ def fit(
         raise SettingError(problem)
     sought = free if isinstance(free, Mapping) else dict.fromkeys(free)
     wanted = measure if isinstance(measure, Mapping) else dict.fromkeys(measure)
-    with as_fmu(source, scene) as path:
+    derivatives = [f"{','.join(wanted)}:{','.join(sought)}"] if wanted and sought else []
+    with as_fmu(source, scene, sensitivities=derivatives) as path:
         description = read_description(path)
         if text := obstacle(path, description):
             raise SimulationError(f"{str(path)!r} {text}")
@@ -127,6 +130,7 @@ def _solve(name: str, problem: Problem, residuals: Residuals, loss: str) -> Fit:
         cost=float(found.cost),
         runs=residuals.runs,
         difference=residuals.difference,
+        own=frozenset(residuals.own),
     )
 
 
