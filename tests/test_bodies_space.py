@@ -14,6 +14,7 @@ from sympy import Symbol, cos, sin
 from lagfmu import Track, simulate
 from lagfmu.bodies import (
     Body,
+    Contact,
     Cylindrical,
     Distance,
     Fixed,
@@ -291,6 +292,26 @@ def test_a_bead_on_a_rough_helix_rubs_with_the_norm_of_what_is_across_it():
     np.testing.assert_allclose(run["der(K.curve.s)"] * way, v, rtol=1e-9)
     normal, rubs = m * across(v), m * mu * across(v)
     np.testing.assert_allclose(run["force.K.norm"][1:], np.hypot(normal, rubs)[1:], rtol=1e-9)
+
+
+def test_a_spinning_top_stands_on_a_contact_as_on_a_ball_joint():
+    """Its tip lies aside of its centre: what turns with it pushes too.  It does not slip while it stands on a
+    rough floor, and both carry m (g + the acceleration of the centre)."""
+    top = Body("top", 0.1, (1e-4, 1e-4, 5e-5), center=(1e-4, 0, 0.04))
+    tip = ground.at((0, 0, 0)), top.at((0, 0, 0))
+    given = {"bodies": [top], "loads": [Gravity((0, 0, -g))]}
+    start = {"top.rpy": (0.3, 0.1, 0), "top.omega": (0.5, 0, 150.0), "end.velocity": (0, 0, 0)}
+    given |= {"read": {"end": tip[1]}, "start": start}
+    held = mechanism("Held", joints=[Spherical("tip", *tip)], **given)
+    contact = Contact("tip", *tip, friction=2.0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        free = mechanism("Free", contacts=[contact], **given)
+    runs = [simulate(model, 0.02, 0.002, tolerance=1e-10) for model in (held, free)]
+    assert runs[1]["sticks.tip"].all()
+    for name in ("force.tip.x", "force.tip.y", "force.tip.z", "der(top.omega.x)"):
+        one, two = (run[name] for run in runs)
+        np.testing.assert_allclose(one, two, atol=1e-8 * abs(one).max(), err_msg=name)
 
 
 def test_a_gear_in_space_counts_turns():

@@ -24,11 +24,13 @@ UNITS = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
 @dataclass(frozen=True)
 class Closed:
     """What is closed -> symbols, and the rates of these; `positions`: those of coordinates alone, whose rates
-    are linear in the speeds."""
+    are linear in the speeds.  `carried`: of fixed vectors these rates as one symbol, which has a
+    rate itself."""
 
     symbols: dict[Expr, Expr] = field(default_factory=dict)
     positions: dict[Expr, Expr] = field(default_factory=dict)
     rates: dict[Expr, Expr] = field(default_factory=dict)
+    carried: dict[Expr, Expr] = field(default_factory=dict)
 
     def matrix(self, k: int, e: tuple[Expr, ...], w: tuple[Expr, ...]) -> None:
         """R and its rate."""
@@ -49,7 +51,7 @@ class Closed:
             slopes = [self._symbol(Carried(1, i, *e, *s, *unit)) for unit in UNITS]
             rate, bend = (self._symbol(Carried(k, i, *e, *s, *w)) for k in (1, 2))
             self.positions[value] = sp.Add(*map(sp.Mul, slopes, w))
-            self.rates[rate] = bend
+            self.rates[rate], self.carried[value] = bend, rate
 
     def _symbol(self, a: Expr) -> Expr:
         if a == 0:

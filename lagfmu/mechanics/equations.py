@@ -414,6 +414,7 @@ def derive(model: Model) -> EquationsOfMotion:
     slopes = {s: Differential({s: sp.S.One}) for s in v}
     opened = {s: a for a, s in closed.symbols.items()}
     along = Differential({**clock.rates, TIME: sp.S.One}) if closed.symbols else None
+    twice = Differential({**clock.rates, **closed.carried, TIME: sp.S.One})
     for k, constraint in enumerate(model.constraints):
         expression, bend = sp.sympify(constraint.expression).xreplace(table), None
         if not isinstance(constraint, Tie):
@@ -426,7 +427,7 @@ def derive(model: Model) -> EquationsOfMotion:
         elif along:  # by factors as they stand: products of sums stay short
             rate = along(expression) if holonomic else expression
             row, drift = _pfaffian(constraint, rate.xreplace(opened), v, problems, slopes)
-            bend = along(rate)
+            bend = along(twice(expression) if holonomic else rate)
         elif holonomic:
             row, drift = _along(expression, moving), moving.along_time(expression)
         else:
