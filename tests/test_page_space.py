@@ -193,9 +193,15 @@ def test_of_three_js_is_there_what_is_used() -> None:
     assert all(f"{name}:()=>" in library for name in used)
 
 
-def test_paper_is_light(page: Page) -> None:
-    """Printed, the picture is on the page, without its controls."""
-    page.tab.emulate_media(media="print")
-    assert page.tab.locator("#space").is_visible()
-    assert not page.tab.locator("#turn").is_visible()
-    page.tab.emulate_media(media="screen")
+def test_paper_shows_the_picture_in_light_colours(opened: Callable[..., Page]) -> None:
+    """Who reads in the dark prints what others print, without the controls of the view."""
+    shown = []
+    for scheme in ("light", "dark"):
+        page = opened("Gyroscope", color_scheme=scheme, viewport={"width": 700, "height": 700})
+        page.until("lagfmu.runs && lagfmu.view === 'space'")
+        dark = page.tab.evaluate(PIXELS)
+        page.tab.emulate_media(media="print", color_scheme=scheme)
+        assert not page.tab.locator("#turn").is_visible()
+        page.tab.wait_for_timeout(300)
+        shown.append(page.tab.evaluate(PIXELS))
+    assert shown[0] == shown[1] != dark

@@ -36,13 +36,13 @@ def solid(mass: float, inertia: Sequence[float], center: Any, reach: float) -> B
     center = np.array(center, dtype=float)
     near = EQUAL * J[2]
     if J[2] - J[0] < near:
-        return Sphere(tuple(center), _within(np.sqrt(2.5 * J / mass), reach)[0])
+        return Sphere(tuple(center), _within(np.sqrt(10 * J / mass), reach)[0] / 2)
     if min(J[1] - J[0], J[2] - J[1]) < near:
         odd = 2 if J[1] - J[0] < near else 0
         h = np.sqrt(max(12 * J[1] - 6 * J[odd], 0.0) / mass)
-        h, r, _ = _within(np.array([h, np.sqrt(2 * J[odd] / mass), 0.0]), reach)
+        h, width = _within(np.array([h, np.sqrt(8 * J[odd] / mass)]), reach)
         half = axes[:, odd] * h / 2
-        return Rod(tuple(center - half), tuple(center + half), r)
+        return Rod(tuple(center - half), tuple(center + half), width / 2)
     size = np.sqrt(np.maximum(6 / mass * (J.sum() - 2 * J), 0.0))
     return Box(tuple(center), tuple(_within(size, reach)), axes.tolist())
 
