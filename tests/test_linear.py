@@ -587,6 +587,28 @@ def test_the_bound_of_the_condition_number_is_never_below_it(library, seed):
         assert bound == pytest.approx((3 if links > 2 else 2) * np.trace(inverse), rel=1e-9)
 
 
+def test_a_chain_of_bodies_in_space_is_as_well_conditioned_as_it_is(library):
+    """Three rows a link, all on the same bodies: the condition is told by trace(C^-1), which grows like the
+    square of the length, and by no factor of three a link."""
+    rng, links = np.random.default_rng(3), 40
+    rows = np.zeros((3 * links, 3 * links))
+    for k in range(links):
+        across, _ = np.linalg.qr(rng.normal(size=(3, 3)))
+        rows[3 * k : 3 * k + 3, 3 * k : 3 * k + 3] = across
+        if k > 0:
+            rows[3 * k : 3 * k + 3, 3 * k - 3 : 3 * k] = -across
+    full = np.diag(10 ** rng.uniform(-0.5, 0.5, 3 * links))
+    bench = Bench(library, len(full), len(rows), *patterns(full, rows))
+    bench.factor(full, rows)
+    S = rows @ np.linalg.inv(full) @ rows.T
+    d = 1 / np.sqrt(np.diagonal(S))
+    scaled = S * d * d[:, None]
+    widest = 9  # non-zeros in a row of S
+    bound = widest * np.trace(np.linalg.inv(scaled))
+    assert library.bench_condition(bench.handle) == pytest.approx(bound, rel=1e-9)
+    assert np.linalg.cond(scaled) < bound < 1e6
+
+
 @pytest.mark.thorough
 @pytest.mark.skipif("LAGFMU_SANITIZE" in os.environ, reason="this is the run under the sanitizers")
 def test_clean_under_the_sanitizers():

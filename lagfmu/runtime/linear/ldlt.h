@@ -19,6 +19,17 @@ typedef struct {
 SHARED Definite ldlt_factor(const Elimination *e, double *L, double *D, double *row_size, double *row,
                             const int *acts);
 
+/* Scratch of ldlt_trace(): derivatives of log det A by the elements of L (its pattern), D and y (size); y (size), zero
+ * on entry and return. */
+typedef struct {
+    double *by_L, *by_D, *by_y, *y;
+} Reverse;
+
+/* sum_i A_ii (A^-1)_ii, the trace of the inverse of A scaled to a unit diagonal, from its factors L and D = 1 / D;
+ * `diagonal` (size): A_ii by A's own numbers. */
+SHARED double ldlt_trace(const Elimination *e, const double *L, const double *D, const double *diagonal,
+                         const int *acts, const Reverse *x);
+
 /* y <- L^-1 y */
 SHARED void ldlt_forward(const Elimination *e, const double *L, double *y);
 

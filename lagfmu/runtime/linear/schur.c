@@ -24,7 +24,8 @@
 static const double EXACT = 4e3;    /* condition up to which lambda is right to 1e-12 as it is */
 static const double LITTLE = 1e3;  /* cancellation in pivots that does not count: see judge() */
 static const double PLAIN = 1e6;    /* up to which residuals in working precision will do */
-static const double DOUBLED = 1e10; /* up to which refinement is tried if KKT is at hand */
+static const double DOUBLED = 1e10; /* up to which refinement is tried if KKT is at hand; beyond, a bound that
+                                     * costs more is asked */
 static const double PIVOT = 1e-8;   /* smallest pivot of M relative to its diagonal */
 static const double SETTLED = 1e-9; /* a correction so small is followed by one below rounding */
 
@@ -46,6 +47,7 @@ void schur_layout(Linear *l, Arena *arena) {
     at.diagonal = arena_doubles(arena, s->m);
     at.row_size = arena_doubles(arena, full);
     at.row = arena_doubles(arena, full);
+    at.reverse = arena_doubles(arena, plan->schur.forest ? 0 : plan->schur.start[plan->schur.size]);
     at.y = arena_doubles(arena, s->nv);
     at.z = arena_doubles(arena, s->m);
     at.lambda = arena_doubles(arena, s->m);
@@ -156,6 +158,14 @@ static Trust judge(const Linear *l, double bound, double growth) {
     return l->dense == NULL && bound < HUGE_VAL ? SCHUR_DOUBLED : SCHUR_UNSAFE;
 }
 
+/* The condition of S by the trace of its inverse, which is never below it either. */
+static double traced(const Linear *l) {
+    const Schur *own = schur_of(l);
+    const Elimination *e = &l->system->plan->schur;
+    const Reverse scratch = {own->reverse, own->z, own->row_size, own->row};
+    return e->widest * ldlt_trace(e, own->lower, own->inverse, own->diagonal, l->some, &scratch);
+}
+
 int schur_factor(Linear *l) {
     const Plan *plan = l->system->plan;
     Schur *own = schur_of(l);
@@ -167,8 +177,10 @@ int schur_factor(Linear *l) {
         Definite found =
             ldlt_factor(&plan->schur, own->lower, own->inverse, own->row_size, own->row, l->some);
         if (found.failed >= 0) own->doubtful_row = plan->schur.order[found.failed];
-        own->condition = larger(own->condition, found.bound);
         own->growth = larger(own->growth, found.growth);
+        if (found.bound > DOUBLED && found.failed < 0 && !plan->schur.forest)
+            found.bound = larger(traced(l), found.growth);
+        own->condition = larger(own->condition, found.bound);
         own->apart = found.failed < 0 ? 1 / sqrt(found.growth) : 0;
     }
     own->trust = judge(l, own->condition, own->growth);

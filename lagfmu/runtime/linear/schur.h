@@ -24,6 +24,7 @@ typedef struct {
     double *lower, *inverse;   /* S = L' D' L'^T: L' and 1 / D' (m) */
     double *diagonal;          /* (m) S_kk by rows of G; 1 where a row does not act */
     double *row_size, *row;    /* (max(nv, m)) scratch of ldlt.c; row is zero between calls */
+    double *reverse;           /* scratch of ldlt_trace() in the pattern of L' */
     double *y, *z;             /* (nv), (m) scratch of schur_solve() */
     double *lambda;            /* (m) where the caller asks for none */
     double condition, growth;  /* of M and S, the worse of the two (ldlt.h) */
