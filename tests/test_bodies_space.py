@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from sympy import Symbol, cos, sin
+from sympy.physics.vector import dynamicsymbols
 
-from lagfmu import Track, simulate
+from lagfmu import Parameter, Track, simulate
 from lagfmu.bodies import (
     Body,
     Contact,
@@ -27,6 +28,7 @@ from lagfmu.bodies import (
     PointOnPlane,
     Prismatic,
     Revolute,
+    Rolling,
     Spherical,
     Universal,
     mechanism,
@@ -35,7 +37,7 @@ from lagfmu.errors import ModelError
 from lagfmu.testing import load
 
 g = 9.81  # m/s^2
-s = Symbol("s")
+s, TURN, TIME = Symbol("s"), Symbol("turn"), dynamicsymbols._t
 FALL = (0.3, -0.5, -g)
 ground = Ground()
 MODELS = Path(__file__).parent.parent / "models"
@@ -292,6 +294,54 @@ def test_a_bead_on_a_rough_helix_rubs_with_the_norm_of_what_is_across_it():
     np.testing.assert_allclose(run["der(K.curve.s)"] * way, v, rtol=1e-9)
     normal, rubs = m * across(v), m * mu * across(v)
     np.testing.assert_allclose(run["force.K.norm"][1:], np.hypot(normal, rubs)[1:], rtol=1e-9)
+
+
+def test_a_ball_on_a_turntable_goes_round_with_two_sevenths_of_its_rate():
+    """The contact moves with the table: v' = (2/7) W x v, so that the ball rolls on a circle of its own."""
+    table, r = Body("table", 50.0, (10.0, 10.0, 20.0)), 0.02
+    ball = Body("ball", 0.1, (0.4 * 0.1 * r**2,) * 3)
+    model = mechanism(
+        "Turntable",
+        bodies=[table, ball],
+        joints=[
+            Revolute("T", ground.at((0, 0, 0)), table.at((0, 0, 0))),
+            Rolling("R", table.at((0, 0, 0)), ball.at((0, 0, 0)), radius=r),
+        ],
+        loads=[Gravity((0, 0, -g)), Motor("M", "T", motion=3.0 * TURN * TIME)],
+        parameters=[Parameter(TURN, 1.0, "rad/s")],
+        start={"ball.position": (0.3, 0.0, r), "ball.velocity": (0.1, 0.2, 0.0)},
+    )
+    run = simulate(model, 2.0, 0.5, tolerance=1e-10, target="python")
+    rate, v = 2 / 7 * 3.0, 0.1 + 0.2j
+    place = 0.3 + v * (np.exp(1j * rate * run["time"]) - 1) / (1j * rate)
+    np.testing.assert_allclose(
+        run["ball.position.x"] + 1j * run["ball.position.y"], place, atol=1e-8
+    )
+    np.testing.assert_allclose(run["force.R.z"], 0.1 * g, rtol=1e-12)
+    across = np.hypot(run["force.R.x"], run["force.R.y"])
+    np.testing.assert_allclose(across, 0.1 * rate * abs(v), rtol=1e-8)
+
+
+def test_a_shaft_with_two_universal_joints_turns_evenly_and_its_middle_does_not():
+    """Hooke's joint with the bend b: w2/w1 = cos b/(1 - sin^2 b sin^2 a), a from where the first fork lies
+    along the axis of the bend; the second joint, whose forks lie alike, takes that back."""
+    b, J = 0.5, (0.01, 0.01, 0.02)
+    one, two, three = (Body(n, 1.0, J) for n in ("one", "two", "three"))
+    model = mechanism(
+        "Cardan",
+        bodies=[one, two, three],
+        joints=[
+            Revolute("A", ground.at((0, 0, 0)), one.at((0, 0, 0))),
+            Universal("U", one.at((0, 0, 0.1)), two.at((0, 0, -0.5))),
+            Universal("V", two.at((0, 0, 0.5)), three.at((0, 0, -0.1)), "y", second_axis="x"),
+            Cylindrical("B", ground.at((0, np.sin(b), 0.2 + np.cos(b))), three.at((0, 0, 0))),
+        ],
+        start={"angle.A": 0.3, "der(angle.A)": 10.0},
+    )
+    run = simulate(model, 0.5, 0.1, tolerance=1e-10, target="python")
+    np.testing.assert_allclose(run["der(angle.B)"], run["der(angle.A)"], rtol=1e-10)
+    ratio = np.cos(b) / (1 - (np.sin(b) * np.sin(run["angle.A"])) ** 2)
+    np.testing.assert_allclose(run["two.omega.z"] / run["der(angle.A)"], ratio, rtol=1e-9)
 
 
 def test_a_spinning_top_stands_on_a_contact_as_on_a_ball_joint():

@@ -15,7 +15,7 @@ import numpy as np
 import sympy as sp
 
 from ..errors import LagfmuWarning
-from ..model.elements import Expr
+from ..model.elements import Contact, Expr
 from ..model.model import Model
 from .draft import Draft
 from .rows import Array, Rows
@@ -52,6 +52,8 @@ def tell_second_branch(
     if not measures:
         return
     rows = Rows(model, [(e, sp.S.Zero) for e in measures.values()])
+    stops = [c.expression for c in model.constraints if isinstance(c, Contact)]
+    gaps = Rows(model, [(e, sp.S.Zero) for e in stops])
     draws, way = np.random.default_rng(0), float(np.linalg.norm(q - rough))
     here, nearest, apart = rows.values(q), NEAR * way, None
     for _ in range(DRAWS):
@@ -60,12 +62,15 @@ def tell_second_branch(
         far = float(np.linalg.norm(there - rough))
         difference = _turned(measures, rows.values(there) - here)
         another = np.abs(difference).max() > ANOTHER * way
+        if gaps.values(there).min(initial=0.0) < -CLOSED:
+            continue  # beyond a limit
         if missed.max(initial=0.0) <= CLOSED and another and far < nearest:
             nearest, apart = far, difference
     if apart is None:
         return
     k = int(np.argmax(np.abs(apart)))
-    name, taken, other = list(measures)[k], here[k].item(), (here + apart)[k].item()
+    name, taken = list(measures)[k], here[k].item()
+    other = _turned(measures, here + apart)[k].item()
     warnings.warn(
         f"model {model.name!r}: the joints close in two ways that are about as near: taken is the one with "
         f"{name} = {taken!r}; for the other start {name!r} at {other!r}",
@@ -75,6 +80,6 @@ def tell_second_branch(
 
 
 def _turned(measures: Mapping[str, Expr], values: Array) -> Array:
-    """Differences of angles within half a turn."""
+    """Angles within half a turn."""
     angles = [n.startswith("angle") for n in measures]
     return np.where(angles, np.remainder(values + math.pi, 2 * math.pi) - math.pi, values)
