@@ -39,7 +39,7 @@ static Status change_all(Instance *x, Instant at, Direction d, Differentiate sol
                              d.dp, w->dq, w->dv);
     const Direction wide = {d.dt, w->dq, w->dv, d.du, d.dp};
     if (full->dynamics == NULL) {
-        sensitivity_of_energies(w, full, at, x->seen.q, x->seen.v, wide);
+        sensitivity_of_values(w, full, at, x->seen.q, x->seen.v, wide);
         outputs_change(w, NULL, full, at, &x->seen, wide);
         return OK;
     }

@@ -108,7 +108,7 @@ Status sensitivity_adjoint(Sensitivity *w, Mechanism *b) {
     return OK;
 }
 
-void sensitivity_of_energies(Sensitivity *w, const System *s, Instant at, const double *q,
+void sensitivity_of_values(Sensitivity *w, const System *s, Instant at, const double *q,
                              const double *v, Direction d) {
     if (s->tangent == NULL) return;
     s->tangent(at.t, q, v, at.u, at.p, d.dt, d.dq, d.dv, d.du, d.dp, w->dM, w->dF, w->dG, w->dnu,

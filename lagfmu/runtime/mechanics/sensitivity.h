@@ -42,8 +42,8 @@ SHARED Status sensitivity_sides(Sensitivity *w, Mechanism *b, Instant at, const 
  * for every direction.  What dvdot and dlambda are after it is 0. */
 SHARED Status sensitivity_adjoint(Sensitivity *w, Mechanism *b);
 
-/* Changes of the energies along a direction, of a system of which coordinates are only read. */
-SHARED void sensitivity_of_energies(Sensitivity *w, const System *s, Instant at, const double *q,
+/* Changes of M, F, G, nu, gamma, f and the energies along a direction; nothing is solved. */
+SHARED void sensitivity_of_values(Sensitivity *w, const System *s, Instant at, const double *q,
                                     const double *v, Direction d);
 
 /* The change of the share that G's value e has in Q = G^T lambda. */

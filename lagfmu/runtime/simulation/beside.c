@@ -26,6 +26,16 @@ double saltation_step(const Solver *s, Way way) {
     return most > 0 ? EVENT_STEP / most : EVENT_STEP;
 }
 
+void saltation_values_along(Solver *s, Instant at, const double *y, const double *dy, int parameter) {
+    const int nq = s->system->nq;
+    Sensitivity *w = &s->sensitivity;
+    const Direction d = {0, dy, dy + nq, w->du, w->dp};
+    memset(w->du, 0, (size_t)s->system->inputs * sizeof *w->du);
+    if (parameter >= 0) w->dp[parameter] = 1;
+    sensitivity_of_values(w, s->system, at, y, y + nq, d);
+    if (parameter >= 0) w->dp[parameter] = 0;
+}
+
 Status saltation_limits(Solver *s, double t, Way way) {
     const int n = system_states(s->system), watched = indicators_count(s->system);
     struct Saltation *x = s->saltation;

@@ -44,6 +44,7 @@ void saltation_layout(Solver *s, Arena *scratch) {
     x->bend = arena_doubles(scratch, watched);
     x->level = arena_doubles(scratch, watched);
     x->speed = arena_doubles(scratch, watched);
+    x->was = arena_doubles(scratch, saltation_modes_size(system));
     x->modes = arena_doubles(scratch, saltation_modes_size(system));
     x->others = arena_doubles(scratch, saltation_modes_size(system));
 }
@@ -96,6 +97,24 @@ static Status find_flow_after(Solver *s) {
     return flow_at(s, s->state.now.t, x->there, x->flow_after);
 }
 
+/* What is known without differences of an event: its time, and where it was; nothing moves at once. */
+static void take_what_is_known(const Solver *s, int c) {
+    struct Saltation *x = s->saltation;
+    const System *system = s->system;
+    const size_t bytes = (size_t)system->nq * sizeof(double);
+    int events = 0;
+    for (int k = 0; k < EVENT_KINDS; k++) events += event_count_of(system, (EventKind)k);
+    int mode = saltation_modes_size(system) - events;
+    memcpy(x->change, x->direction, bytes);
+    for (int k = 0; k < EVENT_KINDS; k++)
+        for (int i = 0; i < event_count_of(system, (EventKind)k); i++, mode++) {
+            if (x->modes[mode] == x->was[mode]) continue;
+            double *change = x->change + column_of_event(system, (EventKind)k, i);
+            change[0] = x->dt[c];
+            memcpy(change + 1, x->direction, bytes);
+        }
+}
+
 /* The columns behind a map that has just been done, x->found, from those before it. */
 static Status find_columns(Solver *s, const Jump *jump) {
     struct Saltation *x = s->saltation;
@@ -109,6 +128,7 @@ static Status find_columns(Solver *s, const Jump *jump) {
         memcpy(x->direction, x->columns + c * size, bytes);
         for (int j = 0; j < n; j++) x->direction[j] += x->flow_before[j] * x->dt[c];
         status = saltation_map(s, jump, c, x->dt[c]);
+        if (x->limit >= 0) take_what_is_known(s, c);
         memcpy(x->found + c * size, x->change, bytes);
     }
     memcpy(s->state.block, x->after, s->state.block_size);
@@ -133,6 +153,7 @@ static void keep_before(Solver *s) {
     memcpy(x->before, s->state.block, s->state.block_size);
     memcpy(x->columns, s->state.variation, (size_t)(s->columns * column_size(s->system)) * sizeof *x->columns);
     saltation_gather(s, x->from);
+    saltation_modes(s, x->was);
 }
 
 static void no_flow(Solver *s) {
@@ -165,6 +186,25 @@ static void name_event(Solver *s, const char *why) {
     why_append(&s->why, ": %s", why);
 }
 
+/* The speeds of gaps, and how they change along a column, are known without differences: after many rebounds they
+ * are small beside the rounding of these. */
+static Status find_speeds_of_gaps(Solver *s, double t, const double *y) {
+    const System *system = s->system;
+    Mechanism *b = &s->stepped;
+    const double *v = y + system->nq;
+    if (mechanism_evaluate(b, segment_instant(s, t), y, v) != OK) return FAILED;
+    for (int c = 0; c < system->contacts; c++)
+        if (!s->state.closed[c]) s->saltation->speed[c] = mechanism_slip(b, system->contact[c], v);
+    return OK;
+}
+
+static void find_changes_of_gaps(Solver *s, double t, const double *y, int c) {
+    const System *system = s->system;
+    saltation_values_along(s, segment_instant(s, t), y, column_at(s, c), s->column[c].parameter);
+    for (int i = 0; i < system->contacts; i++)
+        if (!s->state.closed[i]) s->saltation->slope[i] = s->sensitivity.df[system->contact[i]];
+}
+
 /* dt of the event's time for each column, by the limits that are passed. */
 static Status find_times(Solver *s, double t, const double *y) {
     const int watched = indicators_count(s->system);
@@ -173,15 +213,21 @@ static Status find_times(Solver *s, double t, const double *y) {
     if (indicators_at(s, t, y, x->level) != OK) return FAILED;
     if (saltation_limits(s, t, (Way){1, y, x->flow_before, -1, x->turn}) != OK) return FAILED;
     for (int i = 0; i < watched; i++) x->speed[i] = x->slope[i];
+    if (find_speeds_of_gaps(s, t, y) != OK) return FAILED;
     for (x->limit = 0; x->limit < watched && s->state.left[x->limit] == 0;) x->limit += 1;
-    for (int i = 0; i < watched; i++)
-        if (s->state.left[i] != 0) x->pace = fmax(x->pace, fabs(x->bend[i] / x->slope[i]));
-    if (!(x->pace * sqrt(GRAZES * s->settings.tolerance) < natural))
-        return fail(&s->why, "a limit is grazed: it is passed by hardly more than the tolerance");
+    for (int i = 0; i < watched; i++) {
+        if (s->state.left[i] == 0) continue;
+        const double pace = fabs(x->bend[i] / x->speed[i]);
+        x->pace = fmax(x->pace, pace);
+        const int returns = x->speed[i] * x->bend[i] <= 0; /* beyond the limit it would turn round */
+        if (!(pace < HUGE_VAL) || (returns && pace * sqrt(GRAZES * s->settings.tolerance) > natural))
+            return fail(&s->why, "a limit is grazed: it is passed by hardly more than the tolerance");
+    }
     for (int c = 0; c < s->columns; c++) {
         int any = 0;
         const Way along = {0, y, column_at(s, c), s->column[c].parameter, NULL};
         if (saltation_limits(s, t, along) != OK) return FAILED;
+        find_changes_of_gaps(s, t, y, c);
         for (int i = 0; i < watched; i++) {
             if (s->state.left[i] == 0) continue;
             const double dt = -x->slope[i] / x->speed[i];

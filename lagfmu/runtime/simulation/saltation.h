@@ -17,7 +17,7 @@ struct Saltation {
     double *level, *speed;           /* (indicators) at the event, and their rates there */
     int limit;                       /* the first of those that are passed; -1: no event */
     double pace;                     /* [1/s] the motion's natural rate; quicker where a limit is passed slowly */
-    double *modes, *others;          /* (saltation_modes_size()) */
+    double *was, *modes, *others;    /* (saltation_modes_size()) before the map, after it, and beside that */
     Why ended;
 };
 
@@ -50,11 +50,14 @@ typedef struct {
 SHARED void saltation_gather(const Solver *s, double *z);
 SHARED void saltation_scatter(Solver *s, const double *z);
 
-/* How it stands, and how often events have happened. */
+/* How it stands, and, at the end, how often events have happened, in the order of a column. */
 SHARED void saltation_modes(const Solver *s, double *modes);
 SHARED int saltation_modes_size(const System *s);
 
-/* beside.c: x->slope and x->bend of the limits, which are x->level at time t, along a way. */
+/* beside.c: changes of the values at y, in s->sensitivity, along dy and p[parameter]. */
+SHARED void saltation_values_along(Solver *s, Instant at, const double *y, const double *dy, int parameter);
+
+/* x->slope and x->bend of the limits, which are x->level at time t, along a way. */
 SHARED Status saltation_limits(Solver *s, double t, Way way);
 
 /* x->change: how the map's state changes along x->direction, dt and the number of column c.  FAILED also where one of

@@ -15,6 +15,7 @@
 
 #include "friction.h"
 #include "nominals.h"
+#include "saltation.h"
 #include "segment.h"
 
 static const double SLIPPING_STEP = 0x1p-17; /* of what y and p are large: cube root of a double's rounding */
@@ -90,17 +91,6 @@ static void variation_rates(Solver *s, double t, const double *y, double *rates)
 
 /* ------------------------------------------------------------------ projection */
 
-/* The changes of f, G and nu along a column. */
-static void tangent_along(Solver *s, Instant at, const double *y, const double *S, int parameter) {
-    const System *system = s->system;
-    Sensitivity *w = &s->sensitivity;
-    memset(w->du, 0, (size_t)system->inputs * sizeof *w->du);
-    if (parameter >= 0) w->dp[parameter] = 1;
-    system->tangent(at.t, y, y + system->nq, at.u, at.p, 0, S, S + system->nq, w->du, w->dp, w->dM, w->dF, w->dG,
-                    w->dnu, w->dgamma, w->df, w->denergy);
-    if (parameter >= 0) w->dp[parameter] = 0;
-}
-
 /* A change of a unit quaternion turns it. */
 static void settle_quaternions(const System *system, const double *q, double *dq) {
     for (int k = 0; k < system->quaternions; k++) {
@@ -116,7 +106,7 @@ static Status project_places(Solver *s, Instant at, const double *y, int c, doub
     Mechanism *b = &s->stepped;
     Sensitivity *w = &s->sensitivity;
     const double *offset = column_at(s, c) + column_of_offset(system, 0);
-    tangent_along(s, at, y, S, s->column[c].parameter);
+    saltation_values_along(s, at, y, S, s->column[c].parameter);
     for (int k = 0; k < system->m; k++) w->c[k] = b->fixed[k] ? offset[k] - w->df[k] : 0;
     if (linear_nearest(&b->linear, NULL, w->c, b->dq, NULL) != OK) return FAILED;
     mechanism_move(b, 1, b->dq, S);
@@ -128,7 +118,7 @@ static Status project_speeds(Solver *s, Instant at, const double *y, const int *
     Mechanism *b = &s->stepped;
     Sensitivity *w = &s->sensitivity;
     double *dv = S + system->nq;
-    tangent_along(s, at, y, S, s->column[c].parameter);
+    saltation_values_along(s, at, y, S, s->column[c].parameter);
     for (int k = 0; k < system->m; k++) w->c[k] = active[k] ? w->dnu[k] - mechanism_row(b, k, dv) : 0;
     for (int e = 0; e < system->entries; e++)
         if (active[system->entry_row[e]]) w->c[system->entry_row[e]] -= w->dG[e] * y[system->nq + system->entry_column[e]];
