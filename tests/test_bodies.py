@@ -375,6 +375,26 @@ def test_a_wheel_on_a_rough_line_rolls_or_slips():
     assert slips["torque.C.z"][1:] == pytest.approx(-0.2 * normal * r, rel=1e-9)
 
 
+def test_what_lies_on_a_rising_plate_begins_to_rise_with_it():
+    """A contact that touches where the mechanism begins holds velocities as a joint does: without a blow."""
+    up, r = symbols("up", real=True), 0.3
+    plate, wheel = Body("plate", 1.0, 0.1), Body("wheel", 2.0, 0.1)
+    model = plane(
+        bodies=[plate, wheel],
+        joints=[Prismatic("lift", ground.at((0, 0)), plate.at((0, 0)), axis="y")],
+        contacts=[Contact("C", plate.at((0, 0)), wheel.at((0, 0)), r)],
+        loads=[Gravity((0, -g)), Motor("drive", "lift", motion=up * t)],
+        start={"wheel.position": (0, r)},
+        parameters=[Parameter(up, 0.5, "m/s")],
+    )
+    rate = dynamicsymbols("wheel.position.y").diff(t)
+    assert model.start[rate] == pytest.approx(0.5, rel=1e-15)
+    run = moved(model, target="native")
+    assert run["wheel.velocity.y"] == pytest.approx(0.5, rel=1e-12)
+    assert run["force.C.y"] == pytest.approx(2.0 * g, rel=1e-12)
+    assert run["closing.C.y.count"][-1] == 0
+
+
 def test_a_parameter_that_two_parts_share_is_one():
     """Two arms of one length, given once: the FMU has it once, in its own unit."""
     L = Parameter(symbols("arm", positive=True), 250.0, "mm")

@@ -88,6 +88,9 @@ def assemble(
     asked = np.concatenate([np.zeros(len(acting)), np.array([*rates.values()])])
     v = moving.velocities([*still, driven], asked, q, np.zeros(len(model.directions)))
     v = moving.velocities(still, np.zeros(len(acting)), q, v)
+    if struck := _struck(model, q, v, size):
+        still.append(Rows(model, [condition(model, c) for c in struck]))
+        v = moving.velocities(still, np.zeros(len(acting) + len(struck)), q, v)
     found = driven.rates(q, v)
     _tell(model, rates, found, float(np.abs(found).max(initial=0.0)))
     fast = float(np.abs(v / moving.scale).max(initial=0.0))
@@ -226,6 +229,14 @@ def _parallel(names: Sequence[str], values: Array) -> Iterator[str]:
                 "square: choose other axes (axis=, second_axis=), turn a marker, or give a body another "
                 "start, as its rpy"
             )
+
+
+def _struck(model: Model, q: Array, v: Array, size: float) -> list[Contact]:
+    """The contacts that touch at q and would be run into with v: they begin closed, without a blow."""
+    contacts = [c for c in model.constraints if isinstance(c, Contact)]
+    gaps = Rows(model, [condition(model, c) for c in contacts])
+    found = zip(contacts, gaps.values(q), gaps.rates(q, v), strict=True)
+    return [c for c, gap, rate in found if abs(gap) <= CLOSED * size and rate < 0]
 
 
 def _open(names: Sequence[str], values: Array, missed: Array) -> Iterator[str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping
 
 import sympy as sp
+from sympy.core.function import AppliedUndef
 from sympy.physics.vector import dynamicsymbols
 
 from ..names import MULTIPLIER, read
@@ -90,10 +91,11 @@ def _undefined(model: ModelFields, what: str, expression: Expr) -> Iterator[str]
     """Quotients and logarithms without a value while a contact is open."""
     below = [e.base for e in expression.atoms(sp.Pow) if e.exp.could_extract_minus_sign()]
     below += [e.args[0] for e in expression.atoms(sp.log)]
-    for contact in (c.name for c in model.constraints if isinstance(c, Contact)):
+    below = sorted((e for e in map(sp.sympify, below) if reactions_in(e)), key=str)
+    for contact in (c.name for c in model.constraints if below and isinstance(c, Contact)):
         nothing = _nothing_in_the_open(model, contact)
-        for e in sorted(below, key=str):
-            if reactions_in(e) and sp.sympify(e).xreplace(nothing).expand() == 0:
+        for e in below:
+            if e.xreplace(nothing).expand() == 0:
                 yield (
                     f"{what}: divides by {plain(e)}, which is 0 while the contact {contact!r} is open, "
                     "so that it has no value there: say which with otherwise=..., e.g. otherwise=0"
@@ -108,10 +110,10 @@ def _nothing_in_the_open(model: ModelFields, contact: str) -> dict[Expr, Expr]:
         if c.name == contact or getattr(c, "while_closed", None) == contact:
             gone[multiplier(c.name)] = sp.S.Zero
         elif hasattr(c, "expression"):
-            f = sp.sympify(c.expression)
+            held = sp.sympify(c.expression).atoms(AppliedUndef, sp.Derivative)
             rate = isinstance(c, Nonholonomic)
-            left |= {q for q in model.coordinates if f.has(q.diff(t) if rate else q)}
-            left |= {w for w in model.speeds if f.has(w)}
-    moved = {q for q in left if q in model.kinematics}
-    left |= {w for q in moved for w in model.speeds if sp.sympify(model.kinematics[q]).has(w)}
+            left |= {q for q in model.coordinates if (q.diff(t) if rate else q) in held}
+            left |= held & model.speeds.keys()
+    for q in left & model.kinematics.keys():
+        left |= sp.sympify(model.kinematics[q]).atoms(AppliedUndef) & model.speeds.keys()
     return gone | {force_of_constraint(q): sp.S.Zero for q in model.directions if q not in left}
