@@ -82,8 +82,10 @@ EVERY = {  # what is tried of every FMU of models/: that its page is the native 
     "Arm": "arm",
     "Bennett": "bennett",
     "Door": "door",
+    "DoubleWishbone": "double_wishbone",
     "Gyroscope": "gyroscope",
     "SliderCrankBodies": "slider_crank_bodies",
+    "Stewart": "stewart",
 }
 # one of each kind: forces alone, multipliers eliminated, a contact and velocities, an input, a table and an
 # output and a prescribed motion, nothing left to integrate by rows

@@ -19,6 +19,7 @@ g = 9.81  # m/s^2
 Case = tuple[float, dict[str, float]]  # stop time [s], values
 STEPS = {  # communication steps of a run, where ten are too few to meet each statement
     "HalfCar": 150,  # its wheels fly for a few hundredths of a second
+    "DoubleWishbone": 100,
     **dict.fromkeys(
         ["Hemisphere", "RollingSphere", "Loop", "Ladder", "BouncingBall", "SlippingSphere"], 40
     ),
@@ -84,6 +85,8 @@ CHANGED = {  # far from the defaults, consistent or not: the projection and the 
     "Arm": {"forearm.mass": 5.0, "gravity.z": -3.7, "rate": 3.0},
     "Bennett": {"one.mass": 2.0, "two.inertia.yy": 0.05, "gravity.z": 3.7},
     "Gyroscope": {"wheel.mass": 0.5, "wheel.inertia.zz": 0.003, "wheel.omega.x": 1.0},
+    "DoubleWishbone": {"speed": 14.0, "strut.stiffness": 5e4, "upright.mass": 40.0},
+    "Stewart": {"sway": 0.05, "rate": 5.0, "plate.mass": 20.0, "rod2.mass": 5.0},
     "Door": {"door.mass": 5.0, "gravity.z": -3.7, "door.inertia.zz": 2.0},
     "SliderCrankBodies": {"rod.mass": 2.5, "crank.inertia": 0.02, "gravity.y": -3.7},
     "DoublePendulum": {"m1": 0.3, "m2": 2, "L1": 2, "L2": 0.5, "y1": 0.3, "der(y2)": 1.5},
@@ -237,6 +240,10 @@ WORLDS: dict[
 SLOW = {
     ("Arm", 1e-8),
     ("Arm", 1e-12),
+    ("DoubleWishbone", 1e-8),
+    ("DoubleWishbone", 1e-12),
+    ("Stewart", 1e-8),
+    ("Stewart", 1e-12),
 }  # tests/test_rigid_bodies.py has their like
 
 

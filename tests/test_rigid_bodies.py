@@ -6,8 +6,11 @@ from functools import partial
 
 import andrews
 import arm
+import hexapod
+import iftomm
 import numpy as np
 import pytest
+import wishbone
 from joints import pin
 from mechanisms import LINKAGES, cardan, door, four_bar, stewart
 from rigid import GROUND, Mass, Mechanism, rotation, state
@@ -110,6 +113,63 @@ def test_an_arm_carries_itself_as_recursive_newton_and_euler_say(axes):
             found = [row[name] for name in names]
             np.testing.assert_allclose(found, wanted[link.name], rtol=0, atol=1e-11 * size)
             assert row[f"lambda.M{k}"] == pytest.approx(wanted[link.name][5], abs=1e-11 * size)
+
+
+@pytest.mark.thorough
+def test_a_platform_on_six_driven_legs_presses_its_joints_as_newton_and_euler_say(native_fmu):
+    """Its motion is prescribed, so that nothing is integrated: the whole wrench in each of 18 joints, and
+    the force of each drive."""
+    run = simulate(native_fmu("Stewart"), stop_time=2.0, step_size=0.25)
+    for row in run:
+        wanted = hexapod.wrenches(row["time"])
+        size = max(np.abs(w).max() for w in wanted.values())
+        for name, wrench in wanted.items():
+            names = [f"{what}.{name}.{x}" for what in ("force", "torque") for x in "xyz"]
+            found = [row[n] for n in names]
+            np.testing.assert_allclose(found, wrench, rtol=0, atol=1e-10 * size)
+        for k in range(1, 7):
+            assert row[f"lambda.drive{k}"] == pytest.approx(wanted[f"leg{k}"][2], abs=1e-10 * size)
+
+
+@pytest.mark.thorough
+def test_a_wheel_loads_its_suspension_as_newton_and_euler_say(native_fmu):
+    """Double wishbone on a bump, from the same start, up to where the wheel leaves the road: the force in
+    each joint, of an integration by hand."""
+    stop = 0.3
+    run = simulate(native_fmu("DoubleWishbone"), stop, tolerance=1e-12)
+    parts = []
+    for name in wishbone.NAMES:
+        r, v, w = (
+            [run[f"{name}.{what}.{x}"][0] for x in "xyz"]
+            for what in ("position", "velocity", "omega")
+        )
+        e = np.array([run[f"{name}.orientation.{x}"][0] for x in "wxyz"])
+        parts.append([*r, *e, *v, *(rotation(e) @ w)])
+    wanted = wishbone.norms(np.concatenate(parts), stop)
+    found = {name: run[f"force.{name}.norm"][-1] for name in wanted}
+    assert found == pytest.approx(wanted, rel=0, abs=ALLOWED * max(wanted.values()))
+
+
+@pytest.mark.filterwarnings("ignore::lagfmu.testing.RedundantConstraintWarning")
+@pytest.mark.parametrize(
+    ("make", "tolerance"),
+    [
+        (iftomm.pendulum, 1e-12),
+        (iftomm.windows, 1e-12),
+        pytest.param(iftomm.squeezer, 1e-12, marks=pytest.mark.thorough),
+        pytest.param(iftomm.bricard, 1e-10, marks=pytest.mark.thorough),
+        pytest.param(iftomm.governor, 1e-12, marks=pytest.mark.thorough),
+    ],
+)
+def test_the_iftomm_benchmarks_press_their_joints_as_other_equations_say(make, tolerance, built):
+    """A01 to A05 of the library of computational benchmark problems, among them mechanisms that lose rank on
+    the way (A02), are overconstrained (A04), or stiff (A05)."""
+    system = make()
+    run = simulate(built(system.model), system.stop, tolerance=tolerance)
+    wanted = system.expected(system.stop)
+    size = max(abs(x) for x in wanted.values())
+    found = {name: float(run[name][-1]) for name in wanted}
+    assert found == pytest.approx(wanted, rel=0, abs=ALLOWED * size)
 
 
 def test_andrews_squeezer_presses_its_pins_as_published(built):
