@@ -33,6 +33,7 @@ class Rods:
     angle: float
     stop: float
     exact: Any  # tensions [N] (samples, count)
+    step: float = STEP  # s, between samples
 
     @property
     def times(self) -> list[float]:
@@ -57,13 +58,19 @@ def pendulum() -> Rods:
     return Rods("pendulum", 1, 1.0, 1.0, 1.0, 10.0, exact)
 
 
+def horizontal() -> Rods:
+    """A01 of the IFToMM library: from rest, horizontal."""
+    stop, angle = 10.0, np.pi / 2
+    return Rods("horizontal", 1, 1.0, 1.0, angle, stop, reference(1, 1.0, 1.0, angle, stop))
+
+
 def chain() -> Rods:
     """models/chain.py, four links, while errors have not yet grown by its chaos."""
     n, m, length, angle, stop = 4, 0.1, 0.25, 1.0, 2.0
     return Rods("chain", n, m, length, angle, stop, reference(n, m, length, angle, stop))
 
 
-PROBLEMS = {"pendulum": pendulum, "chain": chain}
+PROBLEMS = {"pendulum": pendulum, "horizontal": horizontal, "chain": chain}
 
 
 def spins(a: Any, w: Any, length: float) -> Any:

@@ -240,6 +240,55 @@ def pinocchio_joints(problem: Rods, tolerance: float) -> Run:
     return run
 
 
+def heyoka_angles(problem: Rods, tolerance: float) -> Run:
+    """Angles by Taylor's method, of equations derived by hand (those of rods.py), which it compiles; so are
+    the tensions, from the bobs' accelerations."""
+    import heyoka as hy
+
+    n, length = problem.count, problem.length
+    a, w = ([hy.expression(f"{x}{k}") for k in range(n)] for x in "aw")
+    rows = []  # of the linear equations for w', with the right-hand side at the end
+    for k in range(n):
+        below = [n - max(j, k) for j in range(n)]
+        row = [c * hy.cos(a[k] - a[j]) for j, c in enumerate(below)]
+        bends = [c * hy.sin(a[k] - a[j]) * w[j] ** 2.0 for j, c in enumerate(below)]
+        rows.append([*row, -hy.sum([*bends, (n - k) * GRAVITY / length * hy.sin(a[k])])])
+    for k in range(n):  # elimination
+        for i in range(k + 1, n):
+            factor = rows[i][k] / rows[k][k]
+            rows[i] = [x - factor * y for x, y in zip(rows[i], rows[k], strict=True)]
+    spins: list[Any] = [None] * n
+    for k in reversed(range(n)):
+        known = [rows[k][j] * spins[j] for j in range(k + 1, n)]
+        spins[k] = (rows[k][n] - hy.sum(known) if known else rows[k][n]) / rows[k][k]
+    place, forces, acceleration = [*a, *w], [], (0.0, 0.0)
+    for k in range(n):  # what each bob needs, along its rod
+        acceleration = (
+            acceleration[0] + length * (spins[k] * hy.cos(a[k]) - w[k] ** 2.0 * hy.sin(a[k])),
+            acceleration[1] + length * (spins[k] * hy.sin(a[k]) + w[k] ** 2.0 * hy.cos(a[k])),
+        )
+        forces.append([problem.mass * x for x in (acceleration[0], acceleration[1] + GRAVITY)])
+    pulls = []
+    for k in range(n):
+        x, y = (hy.sum([f[i] for f in forces[k:]]) for i in (0, 1))
+        pulls.append(y * hy.cos(a[k]) - x * hy.sin(a[k]))
+    read = hy.cfunc(pulls, place)
+    y0 = np.array([problem.angle] * n + [0.0] * n)
+    equations = [*zip(a, w, strict=True), *zip(w, spins, strict=True)]
+    solver = hy.taylor_adaptive(equations, y0, tol=tolerance)
+
+    def run() -> Any:
+        solver.time = 0.0
+        solver.state[:] = y0
+        found = np.empty((len(problem.times), 2 * n))
+        for row, t in zip(found, problem.times, strict=True):
+            solver.propagate_until(t)
+            row[:] = solver.state
+        return read(np.ascontiguousarray(found.T)).T
+
+    return run
+
+
 PEERS = [
     Peer(
         "Drake, joints, runge_kutta3 (its default)",
@@ -250,6 +299,7 @@ PEERS = [
     Peer("Drake, joints, runge_kutta5", "drake", DECADES, drake_joints("runge_kutta5")),
     Peer("exudyn, distances, generalized alpha", "exudyn", STEPS, exudyn_distances(False)),
     Peer("exudyn, distances, index 2", "exudyn", STEPS, exudyn_distances(True)),
+    Peer("heyoka, angles by hand", "heyoka", DECADES[2:], heyoka_angles),
     Peer("MuJoCo, hinges", "mujoco", STEPS, mujoco_hinges),
     Peer("MuJoCo, tendons", "mujoco", STEPS, mujoco_tendons),
     Peer("Pinocchio, joints, SciPy's DOP853", "pin", DECADES, pinocchio_joints),
