@@ -49,6 +49,7 @@ BLOCKS = list(dict.fromkeys(re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL))
 VARIED = ("parameters", "starts")
 TRIED_ELSEWHERE = (
     "lagfmu.fit",
+    "scipy.optimize",
     "fmpy",
     "libcosimpy",
     "ecospy",

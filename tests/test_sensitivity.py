@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 
 import numpy as np
 import pytest
@@ -47,6 +48,25 @@ def test_a_model_file_gets_derivatives_of_its_own(tmp_path):
     assert by["a"]["derivative"] == pytest.approx(found["value"] / 2, rel=1e-9)
     assert "differences" not in text
     assert (tmp_path / "s.svg").is_file()
+
+
+@pytest.mark.skipif("not __import__('shutil').which('cc')", reason="no C compiler")
+def test_the_best_friction_of_the_documentation_is_the_best(tmp_path, monkeypatch):
+    """As printed in docs/sensitivities.md: between no friction and a cart that stands still there is one at
+    which least energy is left after 10 s; on both sides of it there is more."""
+    page = (MODELS.parent / "docs" / "sensitivities.md").read_text(encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "models").symlink_to(MODELS)
+    command = re.search(r"^    lagfmu (build \S+cart_pendulum.*)$", page, re.MULTILINE)[1]
+    run(*command.split(), "--no-check")
+    (block,) = (b for b in re.findall(r"```python\n(.*?)```", page, re.DOTALL) if "minimize" in b)
+    told: dict = {}
+    exec(block, told)
+    best = told["found"].x[0]
+    assert told["found"].success
+    assert best == pytest.approx(8.35, rel=1e-3)
+    least = told["remaining"]([best])[0]
+    assert all(told["remaining"]([factor * best])[0] > least for factor in (0.9, 1.1))
 
 
 def test_beside_other_events_there_is_no_difference(native_fmu):
