@@ -56,8 +56,8 @@ def test_it_is_no_fmu_for_scheduled_execution(pendulum):
 
 
 def test_a_variable_is_got_by_its_own_type_alone(pendulum):
-    """A Float64 is no Float32, the method an Enumeration and no Int32; counts of values are held against counts
-    of variables."""
+    """A Float64 is no Float32, the method an Enumeration and no Int32; counts of values are held against
+    counts of variables."""
     one = pendulum().start()
     x = one.references(["x"]), c_size_t(1)
     values = (c_double * 2)()
@@ -206,7 +206,8 @@ def test_model_exchange_opens_the_contact(library3):
     one.does("CompletedIntegratorStep", c_bool(True), byref(event), byref(end))
     assert event.value
     one.does("EnterEventMode")
-    assert one.updates() == (False, False)
+    assert one.updates() == (False, True)  # integrators begin anew at such a state
+    assert one.array("GetContinuousStates", 4) == list(states)
     one.does("EnterContinuousTimeMode")
     assert one.get("lambda.surface") == 0
     assert one.get("departure.surface.time") == 1.7
