@@ -12,7 +12,7 @@ from math import dist
 from sympy import Matrix, asin, atan2, eye, symbols, zeros
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import ClosedForm, Output, Parameter, Scene, Spline, output
+from lagfmu import Box, ClosedForm, Output, Parameter, Rod, Scene, Spline, output
 from lagfmu.bodies import (
     Body,
     Contact,
@@ -43,12 +43,27 @@ lower_hinge = {"point": (0.0, 0.35, 0.22), "axis": (1.0, 0.05, 0.02)}
 upper_hinge = {"point": (0.02, 0.42, 0.52), "axis": (1.0, -0.04, 0.03)}
 STRUT = (0.02, 0.45, 0.70), (0.01, 0.58, 0.22)
 
+# How the bodies look.
+RAILS = [
+    Rod((-0.35, 0.33, 0.22), (0.35, 0.37, 0.22), 0.025),
+    Rod((-0.25, 0.43, 0.51), (0.25, 0.41, 0.53), 0.02),
+    Rod((0.02, 0.35, 0.22), STRUT[0], 0.02),
+]
+LOWER = [Rod((x, 0.35, 0.22), LOW, 0.014) for x in (-0.15, 0.15)]
+UPPER = [Rod((x, 0.42, 0.52), HIGH, 0.011) for x in (-0.1, 0.14)]
+TYRE = Rod((0.01, 0.7, 0.31), (0.01, 0.84, 0.31), 0.31)
+CARRIER = [Rod(LOW, HIGH, 0.02), Rod(ARM, LOW, 0.014)]
+
 ground = Ground()
-car = Body("car", 320.0, (60, 60, 90), center=(0, 0.2, 0.5))
-lower = Body("lower", 4.0, (0.05, 0.03, 0.07, 0.002, 0, -0.004), center=(0.01, 0.52, 0.21))
-upper = Body("upper", 2.0, (0.02, 0.012, 0.027), center=(0.02, 0.53, 0.53))
-upright = Body("upright", 28.0, (0.6, 0.9, 0.6, 0.01, 0.02, -0.03), center=MASS)
-post = Body("post", 10.0, (0.2, 0.2, 0.2))
+car = Body("car", 320.0, (60, 60, 90), center=(0, 0.2, 0.5), shape=RAILS)
+lower = Body(
+    "lower", 4.0, (0.05, 0.03, 0.07, 0.002, 0, -0.004), center=(0.01, 0.52, 0.21), shape=LOWER
+)
+upper = Body("upper", 2.0, (0.02, 0.012, 0.027), center=(0.02, 0.53, 0.53), shape=UPPER)
+upright = Body(
+    "upright", 28.0, (0.6, 0.9, 0.6, 0.01, 0.02, -0.03), center=MASS, shape=[TYRE, *CARRIER]
+)
+post = Body("post", 10.0, (0.2, 0.2, 0.2), shape=Box((0, 0.76, -0.02), (0.5, 0.3, 0.04)))
 
 e0, e1, e2, e3 = (dynamicsymbols(f"upright.orientation.{x}") for x in "wxyz")
 axle = Matrix([2 * (e1 * e2 - e0 * e3), 1 - 2 * (e1**2 + e3**2), 2 * (e2 * e3 + e0 * e1)])

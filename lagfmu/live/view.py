@@ -129,7 +129,8 @@ class View:
         style = {"arrowstyle": "-|>", "color": FORCE, "lw": 2, "shrinkA": 0, "shrinkB": 0}
         axes.annotate("", tip, at, arrowprops=style, annotation_clip=False)
         if self.labels:
-            self.name(axes, f"{shape.shape['name']} {shape.length[k]:.3g} N", at, tip)
+            size = float(f"{shape.length[k]:.3g}")  # 5980, as the page has it, not 5.98e+03
+            self.name(axes, f"{shape.shape['name']} {size:g} N", at, tip)
 
     def name(self, axes: Any, text: str, at: Array, tip: Array) -> None:
         """A text beside an arrow, where it covers least: beyond the tip, at its sides, behind the foot."""
