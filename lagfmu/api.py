@@ -75,7 +75,7 @@ def build_fmu(
 
     Without `sources` a native FMU carries no C files: it is smaller, and no tool can compile it again.
 
-    `fmi`: the version of FMI, 2 or 3, of a native FMU; 3 alone has `clocks` and `arrays` (docs/importers.md).
+    `fmi`: the version of FMI, 2 or 3, of a native FMU; 3 alone has `clocks` and `arrays`.
 
     With `page` its documentation holds its live page (documentation/play.html), which needs ziglang.
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import fmpy
 import importers
@@ -155,3 +157,22 @@ def test_fmusim_finds_the_departure(fmi3_fmu: Fmu, tmp_path: Path, way: str) -> 
     rows = np.genfromtxt(table, delimiter=",", names=True)
     assert rows["time"][-1] == 2.0
     assert abs(rows["departuresurfacetime"][-1] - departure()) < 1e-8
+
+
+def test_the_example_of_the_documentation_stops_at_the_departure(
+    fmi3_fmu: Fmu, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The lines of docs/fmi3.md, as they stand, with the FMU where they look: they print the points at
+    1.6 s, twice at the departure, and at 1.7 s."""
+    text = (Path(__file__).parent.parent / "docs" / "fmi3.md").read_text(encoding="utf-8")
+    (block,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    (path,) = re.findall(r'"(.*\.fmu)"', block)
+    (tmp_path / path).parent.mkdir(parents=True)
+    shutil.copy(fmi3_fmu("Hemisphere"), tmp_path / path)
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, Any] = {}
+    exec(block, names)
+    shown = names["result"][16:20]
+    np.testing.assert_allclose(shown["time"], [1.6, departure(), departure(), 1.7], rtol=1e-9)
+    assert np.abs(shown["lambda.surface"][1:]).max() < 1e-13
+    assert shown["contact.surface"].tolist() == [True, True, False, False]
