@@ -416,6 +416,7 @@ def test_names_units_and_descriptions(varied):
         ("lambda.surfac:a", "'lambda.surfac' is unknown; did you mean 'lambda.surface'"),
         ("lambda.surface:b", "parameter or start value 'b' is unknown; did you mean"),
         ("lambda.surface", "expected OUTPUT:PARAMETER,..."),
+        ("departure.surface.count:a", "'departure.surface.count' is not differentiated"),
     ],
 )
 def test_what_is_not_there_is_named(asked, said):

@@ -19,11 +19,20 @@ def differentiated(
     What names nothing is added to `problems`.
     """
     of = {v.name: v for v in variables if _is_differentiable(v)}
+    others = {v.name for v in variables} - of.keys()
     by = {v.name: v for v in variables if v.role in ("parameter", "start")}
     pairs: set[tuple[str, str]] = set()
     for text in asked:
         outputs, _, numbers = text.partition(":")
-        rows = select(listed(outputs), list(of), "sensitivities: the output", problems)
+        wanted = listed(outputs)
+        problems += [
+            f"sensitivities: {name!r} is not differentiated: expected an output of the motion or of its "
+            "events, but no residual, count or extreme, and no energy that frictions dissipate"
+            for name in wanted
+            if name in others
+        ]
+        known = [name for name in wanted if name not in others]
+        rows = select(known, list(of), "sensitivities: the output", problems)
         columns = select(
             listed(numbers), list(by), "sensitivities: the parameter or start value", problems
         )

@@ -3,7 +3,7 @@
  *
  *   g'(0) = (g(-2 d) - 8 g(-d) + 8 g(d) - g(2 d)) / (12 d) ,
  *
- * at a d for which truncation and rounding are about 1e-13.  What lies beside an event is brought onto the
+ * at a d for which truncation and rounding are about 1e-12.  What lies beside an event is brought onto the
  * constraints before it, and to the time at which it passes the same limit, for it is there that modes are decided. */
 #include "saltation.h"
 
@@ -14,16 +14,18 @@
 #include "segment.h"
 
 enum { BESIDE_ROUNDS = 3 };
-static const double EVENT_STEP = 0x1p-10; /* of what y and p are large, and of the natural time */
+static const double BESIDE_STEP = 0x1p-14; /* of what y and p are large, and of the natural time, ... */
+static const double BESIDE_PACE = 0x1p-7;  /* ... and of that in which the rate of the limit changes */
 
 double saltation_step(const Solver *s, Way way) {
-    double most = fabs(way.dt) * s->saltation->pace;
+    const double natural = s->state.now.rate > 0 ? s->state.now.rate : 1;
+    double most = fabs(way.dt) * fmax(natural, s->saltation->pace * (BESIDE_STEP / BESIDE_PACE));
     for (int j = 0; j < system_states(s->system); j++) {
         const double size = fmax(fabs(way.y[j]), nominals_natural(s, j));
         if (size > 0) most = fmax(most, fabs(way.dy[j]) / size);
     }
     if (way.parameter >= 0) most = fmax(most, 1 / (s->p[way.parameter] != 0 ? fabs(s->p[way.parameter]) : 1));
-    return most > 0 ? EVENT_STEP / most : EVENT_STEP;
+    return most > 0 ? BESIDE_STEP / most : BESIDE_STEP;
 }
 
 void saltation_values_along(Solver *s, Instant at, const double *y, const double *dy, int parameter) {

@@ -8,7 +8,7 @@
  *
  * h are the indicators that are watched, R is what the runtime itself does there (modes.c), whatever it is: both are
  * differentiated along (1, S) by central differences of fourth order, at states so near that rounding and truncation
- * are about 1e-13.  If one of these comes out in other modes, the motion may go either way, and there is no
+ * are about 1e-12.  If one of these comes out in other modes, the motion may go either way, and there is no
  * derivative; nor is there where a limit is grazed, or where two are met at one instant and not for all p. */
 #include "saltation.h"
 

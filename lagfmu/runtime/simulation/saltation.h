@@ -35,7 +35,7 @@ enum { BESIDE_POINTS = 4 };
 static const double BESIDE_AT[BESIDE_POINTS] = {-2, -1, 1, 2};
 static const double BESIDE_WEIGHT[BESIDE_POINTS] = {1.0 / 12, -8.0 / 12, 8.0 / 12, -1.0 / 12};
 
-/* The step for it, at which truncation and rounding are about 1e-13. */
+/* The step for it, at which truncation and rounding are about 1e-12. */
 SHARED double saltation_step(const Solver *s, Way way);
 
 /* What is known of a map: the state before it, from which it goes on unless it is a start. */
