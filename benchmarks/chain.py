@@ -1,26 +1,38 @@
-"""How does derivation grow with the model?  A chain of n links in absolute coordinates.
+"""How does a build grow with the model?  Chains of n links, as point masses and as bodies with hinges.
 
-    python benchmarks/chain.py [n ...]
+    python benchmarks/chain.py [masses|bodies] [n ...]
 
-L is a sum of local terms, M and G are sparse, so that derivation and code should cost O(n).  Prints
-the median of three for each n and the growth exponent between neighbours.
+masses: L is a sum of local terms, M and G are sparse.  bodies: a chain in space whose hinges turn about x and
+y by turns; bodies and joints are of a few kinds, instantiated and not derived anew.  Both should cost O(n).
+Prints for each n the processor time [s] of each stage, of masses the median of three runs, and the growth
+exponent between neighbours.
 """
 
 from __future__ import annotations
 
 import math
+import os
 import statistics
 import sys
-import time
-from itertools import pairwise
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command does
 
 from sympy import symbols
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import Holonomic, Model, Parameter, derive
+from lagfmu import Holonomic, Model, Parameter, Scene, derive
+from lagfmu.bodies import Body, Gravity, Ground, Revolute, mechanism
 from lagfmu.codegen.py.equations import source
+from lagfmu.fmu.compiler import chosen
+from lagfmu.fmu.native import sources_of
+from lagfmu.mechanics.form import Form
+from lagfmu.prepare import prepare as steps
+from lagfmu.prepare.steps import Request
 
 RUNS = 3
+Stages = Iterator[str]
 
 
 def chain(n: int) -> Model:
@@ -44,31 +56,78 @@ def chain(n: int) -> Model:
     )
 
 
+def bodies(n: int) -> Model:
+    """n bodies 1 m long, each hinged on the one before, the first on the ground; they hang."""
+    links = [Body(f"b{k}", mass=1.0, inertia=(0.02, 0.03, 0.01)) for k in range(n)]
+    hinges, last = [], Ground().at((0, 0, 0))
+    for k, link in enumerate(links):
+        hinges.append(Revolute(f"J{k}", last, link.at((0, 0, 0.5)), axis="xy"[k % 2]))
+        last = link.at((0, 0, -0.5))
+    start = {f"b{k}.position": (0, 0, -0.5 - k) for k in range(n)}
+    loads = [Gravity((0, 0, -9.81))]
+    return mechanism(f"Bodies{n}", bodies=links, joints=hinges, loads=loads, start=start)
+
+
+def of_masses(n: int) -> Stages:
+    """The model's checks, its equations, their code."""
+    model = chain(n)
+    yield "model"
+    eom = derive(model)
+    yield "derive"
+    source(Form(eom))
+    yield "code"
+
+
+def of_bodies(n: int) -> Stages:
+    """The model with its assembly, equations, variables and Python, start and rank, C, the library."""
+    model = bodies(n)
+    yield "model"
+    scene = Scene(model.name, stop_time=1.0, step_size=0.1)
+    derived = steps.derive(Request(model, scene))
+    yield "derive"
+    lowered = steps.lower(steps.reduce(steps.narrow(derived)))
+    yield "lower"
+    prepared = steps.examine(lowered)
+    yield "start"
+    made = sources_of(prepared)
+    yield "generate"
+    made.compiled(model.name, chosen(["host"]))
+    yield "compile"
+
+
+def measured(stages: Callable[[int], Stages], n: int) -> dict[str, float]:
+    """Processor time [s] of each stage, that of compilers included."""
+    found, before = {}, sum(os.times()[:4])
+    for name in stages(n):
+        now = sum(os.times()[:4])
+        found[name], before = now - before, now
+    return found
+
+
 def main() -> None:
-    """Measure model checks, derivation and code generation."""
-    sizes = [int(a) for a in sys.argv[1:]] or [4, 16, 64]
-    derive(chain(2))  # SymPy's own start-up
-    print(f"{'n':>5} {'model s':>9} {'derive s':>9} {'code s':>9}   growth exponent of each")
-    before: tuple[int, list[float]] | None = None
+    """A line a size."""
+    words = sys.argv[1:] or ["masses"]
+    kind = words.pop(0) if not words[0].isdigit() else "masses"
+    stages, runs = (of_masses, RUNS) if kind == "masses" else (of_bodies, 1)
+    sizes = [int(word) for word in words] or [4, 16, 64]
+    warnings.simplefilter("ignore")
+    measured(stages, 2)  # SymPy's own start-up
+    before: tuple[int, Sequence[float]] | None = None
     for n in sizes:
-        runs = []
-        for _ in range(RUNS):
-            moments = [time.perf_counter()]
-            model = chain(n)
-            moments.append(time.perf_counter())
-            eom = derive(model)
-            moments.append(time.perf_counter())
-            source(eom, None, "multipliers")
-            moments.append(time.perf_counter())
-            runs.append([b - a for a, b in pairwise(moments)])
-        medians = [statistics.median(column) for column in zip(*runs, strict=True)]
+        taken = [measured(stages, n) for _ in range(runs)]
+        medians = [statistics.median(run[name] for run in taken) for name in taken[0]]
+        if before is None:
+            print(
+                f"{'n':>5} " + " ".join(f"{name:>9}" for name in taken[0]) + "   growth exponents"
+            )
         growth = ""
         if before is not None:
             growth = "  ".join(
-                f"{math.log(b / a) / math.log(n / before[0]):.2f}"
+                f"{math.log(max(b, 0.01) / max(a, 0.01)) / math.log(n / before[0]):.2f}"
                 for a, b in zip(before[1], medians, strict=True)
             )
-        print(f"{n:5d} " + " ".join(f"{s:9.3f}" for s in medians) + f"   {growth}")
+        line = " ".join(f"{seconds:9.3f}" for seconds in medians)
+        print(f"{n:5d} {line}   {growth}", flush=True)
         before = (n, medians)
 
 
