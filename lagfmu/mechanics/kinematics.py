@@ -20,6 +20,7 @@ from functools import cached_property
 
 import sympy as sp
 
+from ..model.alike import pattern
 from ..model.elements import Expr
 
 TRIALS = 3
@@ -110,12 +111,20 @@ class Kinematics:
         kinematics restrict the motion as a nonholonomic constraint does.
         """
         found: Turning = [[] for _ in self.v]
+        known: dict[object, dict[int, Expr]] = {}  # of a kind
         for group in self._groups():
-            solve = self._solver(group)
+            solve, kind = self._solver(group), self._kind(group)
             for i in group:
                 for k in (None, *group):
-                    bracket = self._bracket(k, i) if k != i else {}
-                    c = solve(bracket) if bracket else {}
+                    case = kind, group.index(i), k if k is None else group.index(k)
+                    c: dict[int, Expr] | None
+                    if kind is not None and case in known:
+                        c = {group[r]: x for r, x in known[case].items()}
+                    else:
+                        bracket = self._bracket(k, i) if k != i else {}
+                        c = solve(bracket) if bracket else {}
+                        if c is not None and all(x.is_number for x in c.values()):
+                            known[case] = {group.index(r): x for r, x in c.items()}
                     if c is None:
                         names = " and ".join(
                             "time" if x is None else str(self.v[x]) for x in (k, i)
@@ -128,6 +137,19 @@ class Kinematics:
                     for r, x in c.items():
                         found[r].append((i, x if k is None else x * self.v[k]))
         return found, []
+
+    def _kind(self, group: list[int]) -> object:
+        """What groups have in common whose coefficients are the same numbers: bodies; None if they drift."""
+        rows = sorted({j for i in group for j in self.columns[i]} - self.unwrapped)
+        values = [self.columns[i].get(j, sp.S.Zero) for i in group for j in rows]
+        if self._drifting or not values:
+            return None
+        place = {s: ("q", j) for j, s in enumerate(self.q)}
+        found = pattern(values, place.get, "")
+        if found is None:
+            return None
+        numbers = {s: k for k, s in enumerate(found.inputs)}
+        return found.kind, tuple(numbers.get(self.q[j]) for j in rows)
 
     def _groups(self) -> list[list[int]]:
         """Speeds that share coordinates in B, or one of which moves what B of another depends on; without
@@ -144,14 +166,16 @@ class Kinematics:
             for i, column in enumerate(self.columns)
             if i not in plain
         ]
-        groups: list[tuple[set[int], set[int]]] = []
-        for speeds, places in touched:
-            for other in [g for g in groups if g[1] & places]:
-                groups.remove(other)
-                speeds, places = speeds | other[0], places | other[1]
-            groups.append((speeds, places))
+        groups: dict[int, tuple[set[int], set[int]]] = {}
+        group_of: dict[int, int] = {}  # of each place
+        for number, (speeds, places) in enumerate(touched):
+            for other in sorted({group_of[j] for j in places if j in group_of}):
+                more, others = groups.pop(other)
+                speeds, places = speeds | more, places | others
+            groups[number] = speeds, places
+            group_of |= dict.fromkeys(places, number)
         rates = {j: i for i in plain for j in self.columns[i]}
-        return [sorted(s | {rates[j] for j in p if j in rates}) for s, p in groups]
+        return [sorted(s | {rates[j] for j in p if j in rates}) for s, p in groups.values()]
 
     @cached_property
     def _drifting(self) -> list[int]:

@@ -61,7 +61,7 @@ def narrow(derived: Derived) -> Narrowed:
 def reduce(narrowed: Narrowed) -> Reduced:
     """To what the outputs need: coordinates and rows, energies and equations that are read, parameters."""
     form, scene, fixed = narrowed.form, narrowed.scene, dict(narrowed.fixed)
-    coded, read = form, narrowed.read
+    coded, read, whole = form, narrowed.read, narrowed.whole
     if not scene.complete:
         equations = prune.only(form.equations, *prune.needed(_with_numbers(form, fixed), read))
         reduction = form.reduction
@@ -78,11 +78,12 @@ def reduce(narrowed: Narrowed) -> Reduced:
         damped = fold.damped(coded.equations, fixed)
         if scene.method == "auto" and scene.methods is None and not damped:
             scene = replace(scene, method="dop853")
+        whole = variable_table(form, scene)
     check_embedding(form)
     coded = fold.folded_form(coded, fixed)
     numbers = {str(s): n for s, n in coded.equations.numbers.items()}
-    made = {"scene": scene, "form": form, "fixed": fixed, "coded": coded, "numbers": numbers}
-    return Reduced(**vars(narrowed) | made)
+    made = {"scene": scene, "form": form, "whole": whole, "fixed": fixed}
+    return Reduced(**vars(narrowed) | made, coded=coded, numbers=numbers)
 
 
 def _with_numbers(form: Form, fixed: Mapping[Expr, Expr]) -> Form:
@@ -92,15 +93,13 @@ def _with_numbers(form: Form, fixed: Mapping[Expr, Expr]) -> Form:
 
 def lower(reduced: Reduced) -> Lowered:
     """To the variables of the FMU, and to numbers: the equations as the text of a Python module."""
-    whole = table = variable_table(reduced.form, reduced.scene)
+    table = reduced.whole
     text = source(reduced.coded)
     examined = system = compile_system(text)
     if reduced.coded is not reduced.form:
         table, examined = variable_table(reduced.coded, reduced.scene), lowered_form(reduced.form)
     table = table.keeping(reduced.outputs)
-    return Lowered(
-        **vars(reduced), whole=whole, table=table, text=text, system=system, examined=examined
-    )
+    return Lowered(**vars(reduced), table=table, text=text, system=system, examined=examined)
 
 
 def examine(lowered: Lowered) -> Prepared:

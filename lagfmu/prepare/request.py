@@ -9,6 +9,7 @@ from .. import names
 from ..errors import DerivationError, ModelError, RequestError
 from ..interface.sensitivities import differentiated, named
 from ..interface.table import variable_table
+from ..interface.variables import VariableTable
 from ..mechanics import prune
 from ..mechanics.equations import EquationsOfMotion
 from ..mechanics.form import Form
@@ -20,11 +21,12 @@ from .steps import Derived
 
 @dataclass(frozen=True)
 class Asked:
-    """The scene with its formulation, the form that this gives, the outputs by name, and with them what is
-    computed for them."""
+    """The scene with its formulation, the form that this gives, all its variables, the outputs by name, and
+    with them what is computed for them."""
 
     scene: Scene
     form: Form
+    whole: VariableTable
     outputs: tuple[str, ...]
     read: tuple[str, ...]
 
@@ -119,7 +121,8 @@ def _unknown_sensitivities(found: Asked) -> list[str]:
 
 
 def _asked(form: Form, scene: Scene, problems: list[str]) -> Asked:
-    known = [v.name for v in variable_table(form, scene).outputs]
+    whole = variable_table(form, scene)
+    known = [v.name for v in whole.outputs]
     found = set(select(scene.outputs, known, "output", problems))
     found |= {names.barred(name) for name in found}  # a bar is of an output, ...
     found |= {names.bar(name) for name in found}  # ... and an output has its own
@@ -127,4 +130,4 @@ def _asked(form: Form, scene: Scene, problems: list[str]) -> Asked:
     outputs = tuple(name for name in known if name in found)
     behind = [names.measured(name) or names.varied(name) for name in outputs]
     read = tuple(dict.fromkeys((*outputs, *(name for name in behind if name))))
-    return Asked(scene, form, outputs, read)
+    return Asked(scene, form, whole, outputs, read)

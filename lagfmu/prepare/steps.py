@@ -58,11 +58,12 @@ class Derived:
 @dataclass(frozen=True)
 class Narrowed(Derived):
     """`scene`: with its formulation; `form`: the equations in it, contacts that cannot open as constraints;
-    `outputs`: those that are asked for, in the order of the table; `read`: with those that are computed for
-    them; `fixed`: symbols that are numbers."""
+    `whole`: all variables of these; `outputs`: those that are asked for, in the order of the table; `read`:
+    with those that are computed for them; `fixed`: symbols that are numbers."""
 
     scene: Scene
     form: Form
+    whole: VariableTable
     outputs: tuple[str, ...]
     read: tuple[str, ...]
     fixed: Mapping[Expr, Expr]
@@ -97,10 +98,9 @@ class Reduced(Narrowed):
 
 @dataclass(frozen=True)
 class Lowered(Reduced):
-    """`whole`: all variables of `form`, `table`: those of the FMU; `text`: the Python of `coded`, `system`:
+    """`table`: the variables of the FMU; `text`: the Python of `coded`, `system`:
     what that defines; `examined`: the system of `form`, before anything was left out of the code."""
 
-    whole: VariableTable
     table: VariableTable
     text: str
     system: System
