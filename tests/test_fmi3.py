@@ -14,13 +14,14 @@ from typing import Any
 import fmpy
 import numpy as np
 import pytest
-from conftest import FILES, Fmu, of_each_kind
+from conftest import FILES, MODELS, Fmu, of_each_kind
 from fmpy.build import build_platform_binary
 from fmpy.fmi1 import FMICallException
 from fmpy.validation import validate_fmu
+from typer.testing import CliRunner
 
 import lagfmu
-from lagfmu.testing import Face, Plan, Prepared, RefusalError, Session, run_batch, write
+from lagfmu.testing import Face, Plan, Prepared, RefusalError, Session, app, run_batch, write
 
 COMBINATIONS = list(itertools.product((False, True), repeat=2))  # event mode, early return
 COLUMNS = ("r", "theta", "der(theta)", "lambda.surface")
@@ -162,3 +163,21 @@ def test_fmutool_reports_no_error(fmi3_fmu: Fmu) -> None:
     assert run.returncode == 0, text
     assert "compliant with FMI-3.0" in text
     assert not re.search(r"\b(ERROR|FATAL|CRITICAL|WARNING)\b", text), text
+
+
+def test_the_command_builds_it_beside_that_of_fmi_2(tmp_path: Path) -> None:
+    """build --fmi 3: in a folder of its own, verified; what there is none of is wrong usage."""
+    build = ["build", str(MODELS / "atwood.py"), "--out", str(tmp_path)]
+    run = CliRunner().invoke(app, [*build, "--fmi", "3"])
+    assert run.exit_code == 0, run.output
+    (made,) = tmp_path.rglob("*.fmu")
+    assert made == tmp_path / "native-fmi3" / "Atwood.fmu"
+    assert fmpy.read_model_description(str(made)).fmiVersion == "3.0"
+    for wrong, told in (
+        (["--fmi", "3", "--target", "python"], "the target python has FMI 2.0 alone"),
+        (["--fmi", "4"], "expected 2 or 3"),
+        (["--clocks"], "FMI 2.0 has none"),
+    ):
+        run = CliRunner().invoke(app, [*build, *wrong])
+        assert run.exit_code == 2
+        assert told in " ".join(run.output.split())
