@@ -141,6 +141,35 @@ def test_each_bounce_is_a_point_with_two_sides(library3, events, early):
     np.testing.assert_allclose(one.get("y"), plain.get("y"), atol=1e-9)
 
 
+def corner() -> Model:
+    """A ball between two walls, without gravity."""
+    x, y = dynamicsymbols("x y")
+    m = sympy.symbols("m")
+    return Model(
+        name="Corner",
+        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2,
+        coordinates={x: "m", y: "m"},
+        constraints=[Contact("left", x, restitution=0.5), Contact("floor", y, restitution=0.8)],
+        parameters=[Parameter(m, 1.0, "kg")],
+        start={x: 0.3, y: 0.1, x.diff(): -3.0, y.diff(): -1.0},
+    )
+
+
+@pytest.mark.parametrize("later", [0.0, 1e-15, 1e-11])
+def test_impacts_of_one_instant_are_one_event(library3, built, later):
+    """Two walls that are struck at once, whatever rounding makes of the times: one point, both impacts."""
+    one = begin(
+        library3(built(corner(), fmi=3)), events=True, early=True, values={"x": 0.3 + later}
+    )
+    met = []
+    for step in run(one, 0.5):
+        if step.event:
+            one.meets_event()
+            met.append((step.time, *one.floats(["der(x)", "der(y)"])))
+    assert len(met) == 1
+    assert met[0] == pytest.approx((0.1, 1.5, 0.8), abs=1e-10)
+
+
 def test_an_event_at_the_end_of_a_step_is_met_without_early_return(library3):
     """Event mode without early return: a step that ends exactly at the departure signals it there; one that
     ends later has handled it."""
