@@ -179,9 +179,12 @@ def test_what_is_lost_is_drawn_flat(opened: Callable[..., Page]) -> None:
 
 
 def test_of_three_js_is_there_what_is_used() -> None:
-    """The library is made of the names that the page's script mentions, of no more and no fewer."""
+    """The library is made of the names that the page's scripts mention, of no more and no fewer."""
     web = files("lagfmu").joinpath("live", "web")
-    used = re.findall(r"THREE\.(\w+)", web.joinpath("space.js").read_text(encoding="utf-8"))
+    scripts = (
+        web.joinpath(f"{name}.js").read_text(encoding="utf-8") for name in ("meshes", "space")
+    )
+    used = re.findall(r"THREE\.(\w+)", "".join(scripts))
     made = web.joinpath("vendor", "three.js").read_text(encoding="utf-8")
     lists = re.findall(r"export \{([^}]*)\}", made)
     assert set(used) == set(re.findall(r"\w+", " ".join(lists)))

@@ -39,7 +39,7 @@ APPLICATION = (
     "accuracy.js",
     "main.js",
 )
-IN_SPACE = ("space.js", "orbit.js")  # before the last, if the picture is in space
+IN_SPACE = ("meshes.js", "space.js", "orbit.js")  # before the last, if the picture is in space
 WORKER = ("fmu.js", "worker.js")
 COMMENT = re.compile(r"^[ \t]*/\*.*?\*/[ \t]*\n", re.MULTILINE | re.DOTALL)
 INDENTATION = re.compile(r"^[ \t]+", re.MULTILINE)

@@ -1,4 +1,4 @@
-/* three.js -- what web/space.js uses of three.js; CONTRIBUTING.md says how three.min.js is made of it. */
+/* three.js -- what web/meshes.js and space.js use of three.js; CONTRIBUTING.md says how three.min.js is made of it. */
 
 export {
   BoxGeometry,
