@@ -19,7 +19,8 @@
  * A displacement along each speed in turn tells what holds it: dvdot, were it displaced by its
  * size.  The rate of small oscillations is omega = sqrt(|dvdot| / size), and rounding of q shakes v by
  * eps |dvdot| (|q| / size) / omega: on stiff springs that is more than rounding of v itself, and no step
- * could be small enough to resolve it.  At rest on springs that balance, what is left of the
+ * could be small enough to resolve it.  So does rounding of the forces by which rows hold a body still,
+ * eps |F|/m / rate.  At rest on springs that balance, what is left of the
  * acceleration is such rounding, and omega is the natural rate.
  *
  * Without either, as in a free fall from rest, x = a t^2/2 looks the same on every scale, and the
@@ -383,6 +384,9 @@ Status nominals_complete(Solver *s, Instant at, double span) {
     const double natural = find_own(s, span, felt, own);
     if (find_held(s, at, back, shaken) != OK) return FAILED;
     if (!(s->state.now.rate > 0)) s->state.now.rate = find_natural_rate(s, span, felt, back, natural);
+    for (int i = 0; i < s->system->nv; i++) /* what rows hold still is shaken by rounding of their forces */
+        if (s->state.now.rate > 0 && fabs(s->stepped.vdot[i]) <= LOST * felt[i])
+            shaken[i] = larger(shaken[i], DBL_EPSILON * felt[i] / s->state.now.rate);
     take_sizes(s, felt, own);
     return find_scales(s, own, shaken);
 }
