@@ -87,9 +87,13 @@ def test_the_full_fmu_is_the_scene_that_asks_for_everything(
     name: str, native_fmu: Any, make: Make
 ) -> None:
     """Asking for every output, parameter, input, contact and method by pattern is asking for nothing
-    less: the same bytes."""
+    less: the same bytes, but for the icon, which the FMUs that tests share do not have."""
     asked = make(name, outputs=["*"], inputs=["*"], contacts=["*"], methods=METHODS)
-    assert native_fmu(name).read_bytes() == asked.read_bytes()
+    full, other = (
+        {n: archive.read(n) for n in archive.namelist() if not n.startswith("terminalsAndIcons/")}
+        for archive in (zipfile.ZipFile(native_fmu(name)), zipfile.ZipFile(asked))
+    )
+    assert full == other
 
 
 @pytest.mark.parametrize("name", of_each_kind(KINDS, kinds=("Hemisphere", "KnifeEdge", "HalfCar")))
