@@ -136,7 +136,8 @@ def test_the_page_travels_in_the_fmu(
     target: str, tmp_path: Path, browser: Any, request: pytest.FixtureRequest
 ) -> None:
     """lagfmu build --page: the page lies beside the documentation, which has a link to it, and the FMU
-    grows by 250 kB at most; without the option it is as it was."""
+    grows by 250 kB at most; without the option it is as it was (but for the icon, which the FMUs that tests
+    share do not have)."""
     model = str(MODELS / "rolling_sphere.py")
     words = f"--scene RollingSphere --target {target} --no-check --page --out {tmp_path}"
     result = CliRunner().invoke(app, ["build", model, *words.split()])
@@ -146,7 +147,8 @@ def test_the_page_travels_in_the_fmu(
     for path in (tmp_path / target / "RollingSphere.fmu", plain):
         sizes.append(path.stat().st_size)
         with zipfile.ZipFile(path) as archive:
-            contents.append({n: archive.read(n) for n in archive.namelist()})
+            told = [n for n in archive.namelist() if not n.startswith("terminalsAndIcons/")]
+            contents.append({n: archive.read(n) for n in told})
     assert sizes[0] - sizes[1] < 250e3
     live, index = contents[0].pop("documentation/play.html"), "documentation/index.html"
     assert b'href="play.html"' in contents[0].pop(index)

@@ -6,9 +6,9 @@ import re
 import shutil
 import zipfile
 
-import browser
 import numpy as np
 import pytest
+from browser import Page, program
 from conftest import MODELS
 from lxml import html
 from typer.testing import CliRunner
@@ -187,26 +187,25 @@ def test_what_cannot_be_reported_is_refused(native_fmu, tmp_path, monkeypatch):
     assert not list(tmp_path.glob("report.*"))
 
 
-@pytest.mark.skipif(browser.program() is None, reason="no Chromium on this machine")
+@pytest.mark.skipif(program() is None, reason="no Chromium on this machine")
 def test_a_pdf_is_printed_where_there_is_a_browser(native_fmu, tmp_path, monkeypatch):
     """A file of several A4 pages."""
-    monkeypatch.setenv("CHROMIUM", str(browser.program()))
+    monkeypatch.setenv("CHROMIUM", str(program()))
     run("report", native_fmu("Hemisphere"), "-o", tmp_path / "h.pdf")
     content = (tmp_path / "h.pdf").read_bytes()
     assert content.startswith(b"%PDF")
     assert re.search(rb"/Count [2-9]", content)
 
 
-def test_the_page_fits_a_telephone(hemisphere):
+def test_the_page_fits_a_telephone(hemisphere, browser):
     """At 390 and 1280 pixels nothing but tables and formulas is wider than the window, and axe-core finds
     no fault."""
-    with browser.chromium() as chromium:
-        for width in (390, 1280):
-            tab = browser.Page(chromium, hemisphere, viewport={"width": width, "height": 800})
-            assert tab.tab.evaluate("document.documentElement.scrollWidth") <= width
-            assert tab.violations() == []
-            assert tab.problems == []
-            tab.close()
+    for width in (390, 1280):
+        tab = Page(browser, hemisphere, viewport={"width": width, "height": 800})
+        assert tab.tab.evaluate("document.documentElement.scrollWidth") <= width
+        assert tab.violations() == []
+        assert tab.problems == []
+        tab.close()
 
 
 def test_a_model_gives_the_same_bytes_twice(tmp_path):
