@@ -198,10 +198,13 @@ def barred(text: str) -> str:
 
 def counted(text: str) -> str:
     """The count of the event that a variable tells the latest time or state of: while it is 0, the variable
-    says nothing (FMI has no way to leave it out: it is a finite 0).  Empty for every other variable."""
+    says nothing (FMI has no way to leave it out: it is a finite 0); of a derivative along the run whether
+    there is one.  Empty for every other variable."""
     found = read(text)
     if found.quantity == ERROR:
         return counted(found.coordinate)
+    if found.quantity == SENSITIVITY:
+        return SENSITIVITY_VALID
     if found.head not in EVENTS or found.quantity in COUNTS:
         return ""
     return name(f"{found.head}.count", found.constraint)

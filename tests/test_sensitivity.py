@@ -5,14 +5,17 @@ from __future__ import annotations
 import json
 import math
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from conftest import MODELS
 from typer.testing import CliRunner
 
+import lagfmu
+from lagfmu import Scene
 from lagfmu.errors import SettingError, SimulationError
-from lagfmu.testing import app, over_ranges, sensitivity
+from lagfmu.testing import app, happened, load, over_ranges, sensitivity
 
 LEAVES = "departure.surface.time"
 
@@ -76,6 +79,27 @@ def test_beside_other_events_there_is_no_difference(native_fmu):
     assert np.isnan(found.derivatives[0, list(found.points).index("r")])
     assert found.why[LEAVES, "r"] == "runs beside this one meet other events"
     assert "runs beside this one meet other events" in repr(found)
+
+
+def test_where_there_is_no_derivative_nobody_takes_its_zero(built, tmp_path):
+    """With r as a plain number the start of the particle may go either way: the FMU gives no derivative by a,
+    and 0 in its place.  A result does not know it, a plot leaves it out, a sweep has NaN, and `sensitivity`
+    takes differences, which find none either."""
+    file = load(MODELS / "hemisphere.py")
+    start = {q: v for q, v in file.model.start.items() if str(q) != "r(t)"}
+    (r,) = (q for q in file.model.start if str(q) == "r(t)")
+    model = replace(file.model, start={**start, r: 1.0})
+    fmu = built(model, Scene("Either", sensitivities=["lambda.surface:a"]), ())
+    name = "sensitivity.lambda.surface.by.a"
+    found = lagfmu.simulate(fmu, stop_time=0.5)
+    assert not found.known(name).any()
+    line = found.plot(name).axes[0].lines[0]
+    assert np.isnan(line.get_ydata()).all()
+    runs = lagfmu.sweep(fmu, {"theta": [0.1, 0.2]}, keep=[f"{name}:last"], stop_time=0.5, workers=1)
+    assert np.isnan(happened(runs, f"{name}:last")).all()
+    told = sensitivity(fmu, ["lambda.surface"], ["a"], stop_time=0.5)
+    assert not told.own.any()
+    assert told.why["lambda.surface", "a"] == "runs beside this one meet other events"
 
 
 def test_a_parameter_at_its_bound_is_changed_to_one_side(native_fmu):

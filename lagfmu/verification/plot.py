@@ -99,7 +99,7 @@ def panels(
                 colour = COLOURS[k % len(COLOURS)]
                 axis.plot(
                     result["time"],
-                    result[n].astype(float),
+                    _told(result, n),
                     color=colour,
                     linestyle=DASHES[k // 4 % len(DASHES)],
                     drawstyle="steps-post" if counts else "default",
@@ -121,6 +121,14 @@ def panels(
             )
         axes[-1, 0].set_xlabel("time [s]")
         yield figure, list(axes[:, 0])
+
+
+def _told(result: Trajectory, name: str) -> Any:
+    """A column; of a derivative along the run as long as there is one."""
+    values = result[name].astype(float)
+    if names.varied(name) and names.SENSITIVITY_VALID in (result.dtype.names or ()):
+        values[result[names.SENSITIVITY_VALID] == 0] = np.nan
+    return values
 
 
 def _counts(column: Any) -> str:

@@ -79,6 +79,8 @@ def kept(texts: Sequence[str], known: Mapping[str, str], outputs: Sequence[str])
                 if known[n] in KINDS and names.read(n).head != names.SOLVER
             ]
     numbers, trajectories, problems = [], [], []
+    if any(names.varied(text.rpartition(":")[0] or text) for text in texts):
+        texts = [*texts, f"{names.SENSITIVITY_VALID}:last"]  # without it a 0 may be none
     for text in dict.fromkeys(texts):
         name, sign, how = text.rpartition(":")
         if not sign or (how not in REDUCTIONS and how != TRAJECTORY and text in known):
