@@ -13,7 +13,7 @@ from instance import instance
 from sympy import symbols
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import Contact, Holonomic, Input, Model, Parameter, Scene
+from lagfmu import Contact, Holonomic, Input, Model, Nonholonomic, Parameter, Scene, simulate
 from lagfmu.errors import ModelError
 from lagfmu.testing import load
 
@@ -311,3 +311,31 @@ def test_rates_are_given_or_estimated():
     model = load(MODELS / "crane.py").model
     with pytest.raises(ModelError, match="rates of input 'F'"):
         replace(model, inputs=[replace(i, rates="estimated") for i in model.inputs])
+
+
+@pytest.mark.parametrize("target", ["native", "python"])
+@pytest.mark.parametrize("of", ["velocity", "place"])
+def test_a_constraint_on_velocities_may_be_driven(target, of):
+    """A block is carried at x' = w with w = t/2, or at x' = u' with u = t^2/4: x = t^2/4, and the force that
+    carries it is lambda = m/2; either way the derivatives are inputs of the FMU."""
+    m = symbols("m", positive=True)
+    x, u = dynamicsymbols("x u")
+    row, unit = (x.diff() - u, "m/s") if of == "velocity" else (x.diff() - u.diff(), "m")
+    model = Model(
+        name="Carried",
+        lagrangian=m * x.diff() ** 2 / 2,
+        coordinates={x: "m"},
+        constraints=[Nonholonomic("belt", row)],
+        parameters=[Parameter(m, 3.0, "kg")],
+        inputs=[Input(u, unit, 0.0)],
+    )
+    table = np.zeros(11, dtype=[(n, float) for n in ("time", "u", "der(u)", "der(u,2)")])
+    table["time"] = time = np.linspace(0, 1, 11)
+    zero = np.zeros(11)
+    drive = (
+        (time / 2, zero + 0.5, zero) if of == "velocity" else (time**2 / 4, time / 2, zero + 0.5)
+    )
+    table["u"], table["der(u)"], table["der(u,2)"] = drive
+    run = simulate(model, 1.0, 0.1, inputs=table, target=target)
+    assert run["x"] == pytest.approx(time**2 / 4, abs=1e-9)
+    assert run["lambda.belt"] == pytest.approx(1.5, rel=1e-9)

@@ -37,11 +37,11 @@ class Parameter:
 class Input:
     """A quantity that the importer drives: a force, a torque, or a prescribed motion u(t).
 
-    A dynamicsymbol that stands in a holonomic constraint or a contact is a prescribed motion: the
-    FMU then has the inputs `u`, `der(u)` and `der(u,2)`, because the constraint's second derivative
-    needs them.  `start` and `rate` [unit/s] are its value and its velocity until the importer sets them.
-    With `rates` = 'estimated' the FMU has the input `u` alone, and takes the derivatives from its values at
-    the communication points.
+    A dynamicsymbol that stands in a constraint or a contact is a prescribed motion: the FMU then has the
+    inputs `u`, `der(u)` and `der(u,2)`, because the constraint on accelerations needs them (of one on
+    velocities x' = w the first).  `start` and `rate` [unit/s] are its value and its velocity until the
+    importer sets them.  With `rates` = 'estimated' the FMU has the input `u` alone, and takes the
+    derivatives from its values at the communication points.
     """
 
     symbol: Expr
@@ -221,8 +221,7 @@ class ModelFields:
         """Inputs whose first and second derivative the equations need."""
         used: set[Expr] = set(self.energy_expression.atoms(AppliedUndef))
         for constraint in self.constraints:
-            if not isinstance(constraint, Nonholonomic):
-                used |= sp.sympify(constraint.expression).atoms(AppliedUndef)
+            used |= sp.sympify(constraint.expression).atoms(AppliedUndef)
         for relation in self.embedding.relations.values() if self.embedding else ():
             used |= sp.sympify(relation).atoms(AppliedUndef)
         return tuple(i for i in self.inputs if i.symbol in used)
