@@ -375,6 +375,23 @@ def test_inputs_are_followed_within_a_step(library3):
     assert abs(stepped(1)[0] - exact[0]) > 1e-3
 
 
+def test_a_motion_that_was_supplied_stands_where_it_was_supplied(library3):
+    """The crane's rope is drawn in at 1 m/s within one step: at its end the rope, and the input that is read,
+    are as long as the importer said at that time."""
+    motion = {"l": lambda t: 2 - t, "der(l)": lambda t: -1.0, "der(l,2)": lambda t: 0.0}
+
+    def supplied(one, time, asked, returns):
+        for name, value in motion.items():
+            if asked:
+                one.set(name, value(time))
+
+    one = library3("Crane")(between=supplied, named=list(motion)).start(tolerance=1e-12)
+    one.step(0.1)
+    assert one.floats(list(motion)) == [value(0.1) for value in motion.values()]
+    x, y = one.floats(["x", "y"])
+    assert math.hypot(x - one.get("s"), y) == pytest.approx(1.9, abs=1e-12)
+
+
 def test_outputs_are_read_within_a_step_and_change_nothing(library3):
     """Hemisphere in one step of 1.5 s: at each instant that the importer is shown, lambda is that of the
     closed form at that angle, times only rise, and the end is the same bits as without a look."""

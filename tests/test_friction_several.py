@@ -22,6 +22,7 @@ from sympy.physics.mechanics import dynamicsymbols
 from lagfmu import (
     Contact,
     Friction,
+    Holonomic,
     Input,
     Model,
     Nonholonomic,
@@ -464,6 +465,40 @@ def carried() -> Model:
         parameters=[*MASS, Parameter(mu, 0.5, "1")],
         inputs=[Input(F, "m/s")],
     )
+
+
+def on_moved_belt() -> Model:
+    """A block on a belt of which an importer sets the place, with its rates."""
+    return Model(
+        name="OnMovedBelt",
+        lagrangian=m * (x.diff() ** 2 + z.diff() ** 2) / 2 - m * G * z,
+        coordinates={x: "m", y: "m", z: "m"},
+        constraints=[
+            Contact("floor", z),
+            Holonomic("belt", F - y),
+            Nonholonomic("ride", x.diff() - y.diff()),
+            Friction("grip", of=["ride"], normal=multiplier("floor"), static=mu),
+        ],
+        parameters=[*MASS, Parameter(mu, 0.5, "1")],
+        inputs=[Input(F, "m")],
+    )
+
+
+@pytest.mark.parametrize("jump", [0.03, 0.3, 3.0])
+@pytest.mark.parametrize(("model", "velocity"), [(carried, "F"), (on_moved_belt, "der(F)")])
+def test_what_sticks_to_a_motion_that_jumps_slips(
+    built: Built, model: Callable[[], Model], velocity: str, jump: float
+) -> None:
+    """However small the jump v of a belt's speed, the block slips for v/(mu g), which takes half of m v^2."""
+    with instance(built(model())) as one:
+        one.start({})
+        one.step(0.1)
+        one.set(velocity, jump)
+        one.step(1.0)
+        assert one.get("slipping.grip.count") == 1
+        assert one.get("sticks.grip") == 1
+        assert one.get("sticking.grip.time") - 0.1 == pytest.approx(jump / (0.5 * g), rel=1e-8)
+        assert one.get("energy.dissipated") == pytest.approx(jump**2 / 2, rel=1e-7)
 
 
 def test_a_belt_that_jumps_away_is_slipped_on_until_the_block_has_its_speed(built: Built) -> None:

@@ -163,6 +163,9 @@ SHARED int instance_was_set(const Instance *x, const Variable *v, double *value)
 /* 1: inputs have other values than they had come to, and more than the forces may change with them. */
 SHARED int instance_turned(const Instance *x);
 
+/* Tells the drive whether they have, and whether a motion has jumped. */
+SHARED void instance_turn(Instance *x);
+
 /* Once for each: redundant rows share a normal force, and the motion may depend on how. */
 SHARED void instance_warn_of_shares(Instance *x);
 

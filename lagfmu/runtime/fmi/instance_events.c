@@ -93,9 +93,9 @@ Status instance_settle(Instance *x, int *again) {
     if (x->solver.state.now.pending || !instance_turned(x)) return OK;
     instance_unfollow(x);
     if (PRESCRIBED != NULL) PRESCRIBED->begin_step(x);
-    x->solver.drive.turned = 1;
+    instance_turn(x);
     const Status status = at_once(x, solver_follow);
-    x->solver.drive.turned = 0;
+    x->solver.drive.turned = x->solver.drive.jumped = 0;
     if (status != OK) return FAILED;
     memcpy(x->expected, x->solver.drive.value, (size_t)s->inputs * sizeof *x->expected);
     *again = x->ticking;

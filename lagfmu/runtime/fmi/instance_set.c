@@ -33,6 +33,12 @@ int instance_turned(const Instance *x) {
     return 0;
 }
 
+void instance_turn(Instance *x) {
+    Drive *drive = &x->solver.drive;
+    drive->turned = instance_turned(x);
+    drive->jumped = drive->turned && PRESCRIBED != NULL && PRESCRIBED->jumped(x);
+}
+
 void instance_inputs_changed(Instance *x) {
     solver_inputs_changed(&x->solver);
     if (ERROR_BARS != NULL) ERROR_BARS->inputs_changed(x);

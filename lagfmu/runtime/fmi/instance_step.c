@@ -110,7 +110,7 @@ static void close_step(Instance *x) {
     s->supply = NULL;
     for (int k = 0; k < s->system->inputs; k++) {
         if (!x->between.supplied[k]) continue;
-        s->drive.value[k] = x->between.value[k];
+        s->drive.value[k] = x->expected[k] = x->between.value[k];
         s->drive.first[k] = s->drive.second[k] = 0;
     }
 }
@@ -121,7 +121,7 @@ static void prepare_step(Instance *x, double t_end) {
     instance_unfollow(x);
     instance_save(x, x->backup);
     if (PRESCRIBED != NULL) PRESCRIBED->begin_step(x);
-    x->solver.drive.turned = instance_turned(x);
+    instance_turn(x);
     memcpy(x->expected, x->solver.drive.value, (size_t)x->solver.system->inputs * sizeof *x->expected);
     instance_count_events(x);
     if (ERROR_BARS != NULL) ERROR_BARS->begin_step(x, t_end);
@@ -134,9 +134,9 @@ static void prepare_step(Instance *x, double t_end) {
 static void finish_step(Instance *x) {
     Solver *s = &x->solver;
     const double t = s->state.now.t;
-    close_step(x);
     if (ERROR_BARS != NULL) ERROR_BARS->follow(x, t);
     move_inputs(x, t);
+    close_step(x);
     memset(x->set, 0, (size_t)s->system->inputs * sizeof *x->set);
     if (s->passed.text[0] != '\0') x->tell(x->context, NOTE_WARNING, s->passed.text);
     if (s->system->lookup_count > 0) warn_of_tables(x);

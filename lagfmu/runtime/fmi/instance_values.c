@@ -19,7 +19,7 @@ static Status follow(Instance *x) {
     x->followed = 1;
     x->observed = x->evaluated = 0;
     if (estimated) PRESCRIBED->estimate(x);
-    x->solver.drive.turned = instance_turned(x);
+    instance_turn(x);
     if (ERROR_BARS != NULL) ERROR_BARS->turn(x);
     if (solver_look(&x->solver) == OK) return OK;
     instance_unfollow(x);

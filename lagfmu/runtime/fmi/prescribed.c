@@ -57,15 +57,28 @@ static void estimate(Instance *x) {
     }
 }
 
+/* Over the latest step the motion at k has moved otherwise than its rates say. */
+static int otherwise(const Instance *x, int k) {
+    const double *u = x->solver.drive.value, h = x->solver.state.now.span;
+    return h > 0 && !is_estimated(x->solver.system, k) && rates_half_connected(u + k, x->expected + k, h);
+}
+
+static int jumped(const Instance *x) {
+    const System *s = x->solver.system;
+    for (int i = 0; i < s->prescribed_count; i++)
+        if (otherwise(x, s->prescribed[i])) return 1;
+    return 0;
+}
+
 /* Once, at the first step that shows it: of a prescribed motion not all three inputs are connected. */
 static void warn_of_rates(Instance *x) {
     const System *s = x->solver.system;
-    const double *u = x->solver.drive.value, h = x->solver.state.now.span;
+    const double h = x->solver.state.now.span;
     Why names = {""};
-    if ((x->warned & 1) || !(h > 0)) return;
+    if (x->warned & 1) return;
     for (int i = 0; i < s->prescribed_count; i++) {
         const int k = s->prescribed[i];
-        if (is_estimated(s, k) || !rates_half_connected(u + k, x->expected + k, h)) continue;
+        if (!otherwise(x, k)) continue;
         why_append(&names, "%s%s", names.text[0] == '\0' ? "" : ", ", input_name(k));
     }
     if (names.text[0] == '\0') return;
@@ -97,4 +110,4 @@ static Status restored_motions(Instance *x) {
     return OK;
 }
 
-SHARED_VALUE const Prescribed MOTIONS = {motion_was_set, estimate, order, rate_of_motion, begin_motions, restored_motions};
+SHARED_VALUE const Prescribed MOTIONS = {motion_was_set, estimate, order, rate_of_motion, jumped, begin_motions, restored_motions};

@@ -17,6 +17,8 @@ typedef struct {
     int (*order)(const Instance *x, int k);
     /* The derivative with respect to time of an input that stands at `place` in its motion. */
     double (*rate)(const Instance *x, int k, int place);
+    /* 1: a motion, with its rates, was set elsewhere than they account for: it has jumped. */
+    int (*jumped)(const Instance *x);
     /* Estimates rates from values; tells of motions whose rates are not connected. */
     void (*begin_step)(Instance *x);
     /* FAILED: what was read is no past of a motion. */

@@ -29,7 +29,8 @@ typedef struct {
 typedef struct {
     double since;                     /* [s] when they were set */
     double *value, *first, *second;   /* (inputs) */
-    int turned;                       /* 1: they were set to other values than they had come to */
+    int turned;                       /* 1: they were set to other values than they had come to, ... */
+    int jumped;                       /* ... a motion not only by what its rates account for */
 } Drive;
 
 /* u at time t.  */
