@@ -45,7 +45,8 @@ class Rows:
             kind.rows.append(i)
             read = zip(found.inputs, found.groups, strict=True)
             kind.inputs.append([place[s][1] if g else float(s.xreplace(known)) for s, g in read])
-        self._kinds = [_Function(kind, n) for kind in kinds.values()]
+        names = sp.numbered_symbols()  # no dummies: lambdify would replace them one by one
+        self._kinds = [_Function(kind, n, names) for kind in kinds.values()]
         everything = [s for f in self._kinds for s in f.symbols]
         parts = [f.parts for f in self._kinds]
         self._made = sp.lambdify(everything, parts, "numpy") if parts else lambda: []
@@ -97,7 +98,7 @@ class _Function:
     """The `rows` of a kind and the `speeds` that each reads; `parts` are their value, their rate without
     speeds and its slopes, in `symbols`."""
 
-    def __init__(self, kind: _Kind, n: int) -> None:
+    def __init__(self, kind: _Kind, n: int, names: Iterator[Expr]) -> None:
         symbols, groups = kind.pattern.symbols, kind.pattern.groups
         value, rate = kind.pattern.values
         v = [s for s, group in zip(symbols, groups, strict=True) if group == "v"]
@@ -109,10 +110,10 @@ class _Function:
         used = set().union(*(e.free_symbols for e in self.parts))
         self._closed = [(s, place) for s, place in places.items() if s in used]
         self._plain = [k for k, s in enumerate(symbols) if s in used]
-        table = {s: sp.Dummy() for s in used}
+        read = [*(symbols[k] for k in self._plain), *(s for s, _ in self._closed)]
+        table = {s: next(names) for s in read}
         self.parts = [e.xreplace(table) for e in self.parts]
-        self.symbols = [table[symbols[k]] for k in self._plain]
-        self.symbols += [table[s] for s, _ in self._closed]
+        self.symbols = [*table.values()]
         self.rows = np.array(kind.rows)
         columns = [np.array(column) for column in zip(*kind.inputs, strict=True)]
         self._columns = [(c, group) for c, group in zip(columns, groups, strict=True)]
