@@ -77,6 +77,7 @@ EVERY = {  # what is tried of every FMU of models/: that its page is the native 
     "CrankWithBearingFriction": "crank_with_bearing_friction",
     "FallingRod": "falling_rod",
     "FrictionOscillator": "friction_oscillator",
+    "Hoop": "hoop",
     "InclineFriction": "incline_friction",
     "RoughHemisphere": "rough_hemisphere",
     "Arm": "arm",
@@ -85,6 +86,7 @@ EVERY = {  # what is tried of every FMU of models/: that its page is the native 
     "DoubleWishbone": "double_wishbone",
     "Gyroscope": "gyroscope",
     "SliderCrankBodies": "slider_crank_bodies",
+    "SphereInCylinder": "sphere_in_cylinder",
     "Stewart": "stewart",
 }
 # one of each kind: forces alone, multipliers eliminated, a contact and velocities, an input, a table and an

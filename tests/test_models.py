@@ -35,6 +35,8 @@ CHANGED = {  # far from the defaults, consistent or not: the projection and the 
     "PendulumAngle": {"m": 0.3, "g": 1.6, "L": 2, "theta": 2, "der(theta)": 0.2},
     "PendulumNullspace": {"m": 0.3, "g": 1.6, "L": 2, "x": 1.7, "y": 0.9, "der(x)": 0.4},
     "RotatingWire": {"m": 0.3, "omega": -1.5, "r": 0.4, "der(r)": -0.9, "der(phi)": -1.5},
+    "Hoop": {"m": 0.3, "g": 3.7, "R": 0.5, "omega": -2.0, "theta": 2.0, "der(theta)": 1.0},
+    "SphereInCylinder": {"m": 2.3, "g": 3.7, "R": 0.3, "a": 0.02, "der(phi)": -8.0, "wx": 40.0},
     "Crane": {"M": 500, "m": 900, "g": 1.6, "c": 40, "x": -1.5, "y": -5.5, "l": 6.0, "der(l)": 0.1},
     "CrankWithBearingFriction": {"m1": 3, "J2": 0.05, "a": 0.12, "b": 0.4, "r": 0.02, "mu": 0.15},
     "HalfCar": {"M": 900, "J": 1100, "m": 90, "k": 3e4, "c": 2e3, "der(s)": 15.0},
@@ -229,6 +231,18 @@ WORLDS: dict[
         )
     ],
     "RoughHemisphere": [(2.0, {"theta": 0.2}), (2.0, {"der(theta)": 0.9})],
+    "Hoop": [  # too slow to leave the bottom; through the bottom; about the top; at rest beside it
+        (3.0, {"omega": 5.0}),
+        (3.0, {"theta": -0.5, "der(theta)": 3.0, "omega": 5.0}),
+        (1.0, {"theta": 3.1, "der(theta)": 20.0}),
+        (3.0, {"theta": float(np.arccos(g / (0.2 * 10.0**2)))}),
+    ],
+    "SphereInCylinder": [  # lying: a pendulum, which rolls along too; leaning; over the top; it stays up
+        (3.0, {"tilt": np.pi / 2, "phi": 1.0, "der(phi)": 0.0, "der(z)": 0.3, "wx": 20.0}),
+        (3.0, {"tilt": 0.7, "phi": 1.0, "der(phi)": 3.0}),
+        (3.0, {"tilt": 1.2, "phi": 2.5, "der(phi)": 1.0}),
+        (3.0, {"wx": -5 * g / (2 * 0.1 * 10.0)}),
+    ],
     "SlippingSphere": [
         (2.0, {"mu_s": 1.2, "mu_k": 0.9}),
         (2.0, {"theta": 0.3, "mu_k": 0.05}),
