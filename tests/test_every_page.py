@@ -12,7 +12,7 @@ import fmpy
 import numpy as np
 import pytest
 from browser import Page
-from conftest import EVERY, MODELS, of_each_kind
+from conftest import EVERY, of_each_kind
 
 from lagfmu.testing import (
     LAST,
@@ -21,7 +21,6 @@ from lagfmu.testing import (
     Prepared,
     Session,
     communication_points,
-    load,
     picture_of,
     run_batch,
 )
@@ -214,9 +213,3 @@ def test_a_slider_moves_the_fmu(page: Page, native: Native) -> None:
     }
     assert list(given) == [moved]
     check_end(shown, native.run(**given))
-
-
-def test_every_fmu_is_among_them() -> None:
-    """All scenes of all model files."""
-    files = {s.name: p.stem for p in MODELS.glob("*.py") for s in load(p).scenes}
-    assert files == EVERY

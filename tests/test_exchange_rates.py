@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from conftest import EVERY
+from conftest import EVERY, KINDS, of_each_kind
 from fixed_step import euler, rk4, run
 from fmi2 import Single
 from numpy.typing import NDArray
@@ -55,7 +55,7 @@ def eigenvalues(library) -> tuple[Vector, Vector, Single, list[str]]:
     return stepped, own, one, names
 
 
-@pytest.mark.parametrize("name", EVERY)
+@pytest.mark.parametrize("name", of_each_kind(EVERY, kinds={*KINDS, "Crane", "Belt", "Gyroscope"}))
 def test_no_stabilization_is_quicker_than_the_motion(name, library):
     """No eigenvalue of what the importer integrates lies left of -4 times the largest rate that the motion
     has by itself: its own eigenvalues, the speed at which it turns, sqrt(|acceleration|/size)."""

@@ -187,14 +187,6 @@ def test_a_forged_picture_is_refused(text: bytes) -> None:
         read_picture(text)
 
 
-@pytest.mark.parametrize("name", sorted(p.stem for p in MODELS.glob("*.py")))
-def test_every_model_has_a_picture(name: str) -> None:
-    """Each model of models/ shows its body and, where it has constraints, at least one force."""
-    shapes = model_of(name).picture
-    assert any(isinstance(s, Arrow) for s in shapes)
-    assert any(not isinstance(s, Arrow) for s in shapes)
-
-
 def test_the_arrow_is_as_long_as_the_force(opened: Callable[..., Page]) -> None:
     """At rest on top of the hemisphere the arrow says m g cos(theta0), upward; in flight there is none."""
     page = opened("Hemisphere")

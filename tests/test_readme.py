@@ -14,11 +14,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import typer.main
-from conftest import Fmu
+from conftest import EVERY, Fmu, model_file
 from typer.testing import CliRunner
 
 import lagfmu
-from lagfmu import simulate, verify
+from lagfmu import Arrow, simulate, verify
 from lagfmu.testing import (
     WRONG,
     Bench,
@@ -224,11 +224,21 @@ def test_every_public_name_stands_in_the_reference():
 
 
 def test_the_gallery_names_every_model():
-    """In the repository each row opens the model's file, and says what the model says of itself."""
+    """In the repository each row opens the model's file."""
     rows = re.findall(r"^\| \[[^\]]+\]\(\.\./(\S+)\) \| (.*) \|$", GALLERY, re.MULTILINE)
     files = sorted(p.relative_to(REPOSITORY) for p in (REPOSITORY / "models").glob("*.py"))
     assert [Path(path) for path, _ in rows] == files
-    assert [text for _, text in rows] == [load(REPOSITORY / f).model.description for f in files]
+    assert {f.stem for f in files} == set(EVERY.values())
+
+
+@pytest.mark.parametrize("name", sorted(set(EVERY.values())))
+def test_a_model_file_holds_what_is_said_and_drawn_of_it(name: str) -> None:
+    """Its scenes are among the FMUs that tests go over, the gallery says what the model says of itself, and
+    its picture shows its body and at least one force."""
+    file = model_file(name)
+    assert {s.name for s in file.scenes} == {scene for scene in EVERY if EVERY[scene] == name}
+    assert f"/models/{name}.py) | {file.model.description} |" in GALLERY
+    assert {isinstance(s, Arrow) for s in file.model.picture} == {True, False}
 
 
 def test_links_of_the_pages_lead_somewhere():
