@@ -8,7 +8,7 @@ guide by mu |D.y| [N] against its slip velocity: all of one instant, as the fric
 others.
 """
 
-from sympy import Abs, asin, cos, pi, sign, sin, sqrt, symbols
+from sympy import Abs, Heaviside, asin, cos, pi, sign, sin, sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import (
@@ -137,21 +137,26 @@ def length(pin):
     return sqrt(output(f"lambda.{pin}.x") ** 2 + output(f"lambda.{pin}.y") ** 2)
 
 
+def faster(slip):
+    """1 where rounding does not decide on the sign of a slip [rad/s, m/s], else 0."""
+    return Heaviside(Abs(slip) - 1e-9, 0)
+
+
 closed_forms = [
     *(
         ClosedForm(
             f"torque of pin {pin}",
-            -mu * r * length(pin) * sign(omega),
+            -mu * r * length(pin) * sign(output(f"slip.{pin}.turn")),
             actual=output(f"lambda.{pin}.turn"),
-            when=(1 - output(f"sticks.{pin}")) * sign(omega) ** 2,
+            when=(1 - output(f"sticks.{pin}")) * faster(output(f"slip.{pin}.turn")),
         )
-        for pin, omega in turning.items()
+        for pin in turning
     ),
     ClosedForm(
         "friction of the guide",
-        -mu * Abs(output("lambda.D.y")) * sign(x3.diff()),
+        -mu * Abs(output("lambda.D.y")) * sign(output("slip.D.slide")),
         actual=output("lambda.D.slide"),
-        when=(1 - output("sticks.D")) * sign(x3.diff()) ** 2,
+        when=(1 - output("sticks.D")) * faster(output("slip.D.slide")),
     ),
     # Newton's law of the slider: the pin C pushes it with (-C.x, -C.y), its guide with (slide, D.y).
     ClosedForm(

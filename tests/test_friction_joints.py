@@ -338,14 +338,35 @@ def norms(run: Result) -> dict[str, Any]:
 
 
 def test_each_joint_of_a_slider_crank_rubs_by_its_own_force(crank: Path) -> None:
-    """tau_i = -mu r N_i sgn(omega_i) and F = -mu |N_D| sgn(v) with all N of the same instant, to rounding."""
+    """tau_i = -mu r N_i sgn(omega_i) and F = -mu |N_D| sgn(v) with all N of the same instant, to rounding.
+    The rod begins at rest, where omega_C is rounding: sgn is that of its acceleration."""
     run = simulate(crank, stop_time=0.5, step_size=0.01, tolerance=1e-9)
     for joint, N in norms(run).items():
-        assert run[f"lambda.{JOINTS[joint]}"] == pytest.approx(
-            -0.1 * 0.01 * N * np.sign(run[f"slip.{JOINTS[joint]}"]), rel=1e-11
-        )
+        way = np.sign(run[f"slip.{JOINTS[joint]}"])
+        if joint == "C":
+            way[0] = -np.sign(run["der(phi2,2)"][0])
+        torque = -0.1 * 0.01 * N * way
+        assert run[f"lambda.{JOINTS[joint]}"] == pytest.approx(torque, rel=1e-11)
     assert run["lambda.D.slide"] == pytest.approx(
         -0.1 * np.abs(run["lambda.D.y"]) * np.sign(run["slip.D.slide"]), rel=1e-11
+    )
+
+
+@pytest.mark.parametrize("way", [1.0, -1.0])
+@pytest.mark.parametrize(("rod", "sets_off"), [(0.0, 1.0), (np.pi, -1.0)])
+def test_at_a_dead_centre_the_guide_rubs_against_the_way_that_the_slider_takes(
+    crank: Path, rod: float, sets_off: float, way: float
+) -> None:
+    """At the dead centre the slip is 0, or 5e-16 m/s of either sign by rounding: the guide's friction at the
+    start is the limit of what follows, against the acceleration, whichever way the crank turns."""
+    with pytest.warns(StartMovedWarning):
+        run = simulate(
+            crank, start_values={"phi2": rod, "der(phi1)": 20 * way}, stop_time=1e-6, step_size=1e-7
+        )
+    assert abs(run["slip.D.slide"][0]) < 1e-14
+    assert np.sign(run["der(x3,2)"]) == pytest.approx(sets_off)
+    assert run["lambda.D.slide"] == pytest.approx(
+        -sets_off * 0.1 * np.abs(run["lambda.D.y"]), rel=1e-12
     )
 
 

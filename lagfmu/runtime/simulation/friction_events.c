@@ -34,9 +34,11 @@ static Status begin(Solver *s, Instant at, int *closed, const int *touching) {
         s->state.stick_slip[i] = (StickSlip){0, 0, 1, {1, 0}, 0};
     stick_slip_set_noise(s, speed, s->state.stick_slip);
     for (int i = 0; i < system->frictions; i++) stick_slip_along(b, i, s->state.v, &s->state.stick_slip[i]);
-    Settling x = stick_slip_try(s, at);
-    if (stick_slip_finish(&x, stick_slip_settle(&x, closed, NULL, touching, NULL)) != OK) return FAILED;
-    add_noise_at_work(s);
+    for (int round = 0; round < 2; round++) { /* once more with the noise that the first forces make */
+        Settling x = stick_slip_try(s, at);
+        if (stick_slip_finish(&x, stick_slip_settle(&x, closed, NULL, touching, NULL)) != OK) return FAILED;
+        if (round == 0) add_noise_at_work(s);
+    }
     if (mechanism_residual(b, at, s->state.q, b->f) != OK) return FAILED;
     for (int k = 0; k < system->m; k++)
         if (system->rows[k].friction != 0) s->state.offset[k] = b->f[k];

@@ -29,7 +29,7 @@ from ...verification.closed_forms import applies
 from ...verification.evaluate import alone
 from .closed_forms import EQUATION, judged, laws
 from .facts import Facts, facts_of
-from .judge import EPS, Check, invariants, lost
+from .judge import EPS, ROUNDING, Check, invariants, lost
 from .player import Drive, Run, Values, opened, play
 
 SHIFT = 1e-6
@@ -147,7 +147,9 @@ class Bench:
         with np.errstate(all="ignore"):
             for q in self.facts.coordinates:
                 place = np.abs(run.rows[q])
-                rounding = EPS * abs(run.values.get(q, 0.0))  # of a start that was projected onto 0
+                rounding = ROUNDING * abs(
+                    run.values.get(q, 0.0)
+                )  # of a start that was projected onto 0
                 place = np.where(place > rounding, place, 0.0)
                 size = np.maximum(place, self.facts.same_unit(q, run.values))
                 size = np.where(size > 0, size, 1.0)

@@ -107,7 +107,8 @@ def magnitudes(facts: Facts, run: Run) -> dict[str, float]:
 
     A coordinate is known to the rounding of the value that it was given at the start, however small the
     one is onto which that was projected; a velocity to what would move the coordinate by its rounding within
-    the run; the energy to the work of Q over the rounding of the sizes.
+    the run, or the default experiment if that is shorter (forces balance no better for lasting longer); the
+    energy to the work of Q over the rounding of the sizes.
     """
     found = {}
     work, span = 0.0, float(run.rows["time"][-1] - run.rows["time"][0])
@@ -116,8 +117,8 @@ def magnitudes(facts: Facts, run: Run) -> dict[str, float]:
         found[q] = max(facts.same_unit(q, run.values), rounding)
         peers = [p for p in facts.coordinates if facts.dimensions[p] == facts.dimensions[q]]
         fastest = max(float(np.abs(run.rows[names.derivative(p)]).max()) for p in peers)
-        size = found[q] or facts.usual(q)
-        creep = EPS * (size / span) if span > 0 else 0.0
+        size = max(found[q], float(np.abs(run.rows[q]).max())) or facts.usual(q)
+        creep = EPS * (size / min(span, facts.stop_time)) if span > 0 else 0.0
         found[names.derivative(q)] = max(fastest, creep)
         if names.name(names.FORCE, "", q) in facts.variables:
             work += EPS * size * float(np.abs(run.rows[names.name(names.FORCE, "", q)]).max())
@@ -156,8 +157,15 @@ def _size(facts: Facts, run: Run, constraint: str) -> Column | None:
     if not acting.any():
         return None
     size = np.zeros(len(rows))
-    for q in facts.coordinates:
-        share = facts.share(constraint, q)
+    shares = {q: facts.share(constraint, q) for q in facts.coordinates}
+    if not any(
+        shares.values()
+    ):  # which name constraints of one word only: at least what has f's unit
+        residual = names.name(names.RESIDUAL, constraint)
+        size = np.maximum(
+            _largest_peer(facts, run, residual), facts.same_unit(residual, run.values)
+        )
+    for q, share in shares.items():
         if share is None:
             continue
         column, name = rows[q], q
@@ -181,7 +189,7 @@ def _largest_peer(facts: Facts, run: Run, name: str) -> Column:
     """The largest magnitude so far among the coordinates, or velocities, of the same unit."""
     moving = [n for n in names.motion(facts.coordinates) if n in facts.dimensions]
     same = [n for n in moving if facts.dimensions[n] == facts.dimensions[name]]
-    largest = np.maximum.reduce([np.abs(run.rows[n]) for n in same])
+    largest = np.maximum.reduce([np.zeros(len(run.rows)), *(np.abs(run.rows[n]) for n in same)])
     return np.asarray(np.maximum.accumulate(largest))
 
 
