@@ -79,6 +79,21 @@ def test_redundant_constraints_cost_no_steps(name, pair):
     compare(pair(name), "rk4", 1e-6)
 
 
+def test_an_instance_that_has_not_begun_goes_on_by_the_rows_of_a_saved_state(pair):
+    """Of a four-bar with a redundant row: which rows stand for all is part of the state, and an instance that
+    never initialized has none of its own. One state, one future, to the last bit."""
+    fmu = pair("four_bar")[1]
+    with instance(fmu) as one, instance(fmu, "fresh") as fresh:
+        one.start()
+        one.step(0.25)
+        saved = one.fmu.serializeFMUState(one.fmu.getFMUState())
+        fresh.fmu.setFMUState(fresh.fmu.deserializeFMUState(saved))
+        fresh.time = one.time
+        for each in (one, fresh):
+            each.step(0.25)
+        assert fresh.outputs() == one.outputs()
+
+
 def test_a_loop_that_closes_against_the_count_of_freedoms_needs_the_steps_of_its_order(native_fmu):
     """Bennett's linkage at a 10,000th of the tolerance: a method of order 8 takes 10^(4/8) = 3.2 times the
     steps (it took 240, by rates of another place where rows are at small angles to each other)."""
