@@ -501,6 +501,30 @@ def test_what_sticks_to_a_motion_that_jumps_slips(
         assert one.get("energy.dissipated") == pytest.approx(jump**2 / 2, rel=1e-7)
 
 
+@pytest.mark.parametrize(("model", "velocity"), [(carried, "F"), (on_moved_belt, "der(F)")])
+def test_in_model_exchange_it_slips_at_the_event_of_the_jump(
+    built: Built, model: Callable[[], Model], velocity: str
+) -> None:
+    """The belt runs at v = 0.3 m/s from 0.1 s on, an event in time: the block lags by v^2/(2 mu g)."""
+    v, rows = 0.3, [(0.0, 0.0, 0.0, 0.0), (0.1, 0.0, 0.0, 0.0)]
+    rows += [(0.1, v, 0.0, 0.0), (1.0, v, 0.0, 0.0)]
+    if velocity == "der(F)":
+        rows[2:] = [(0.1, 0.0, v, 0.0), (1.0, 0.9 * v, v, 0.0)]
+    columns = [(name, float) for name in ("time", "F", "der(F)", "der(F,2)")]
+    run = simulate_fmu(
+        str(built(model())),
+        fmi_type="ModelExchange",
+        stop_time=1.0,
+        input=np.array(rows, dtype=columns),
+        relative_tolerance=1e-9,
+        output=["x", "slipping.grip.count", "sticking.grip.time"],
+    )
+    last = run[-1]
+    assert last["slipping.grip.count"] == 1
+    assert last["sticking.grip.time"] - 0.1 == pytest.approx(v / (0.5 * g), rel=1e-7)
+    assert last["x"] == pytest.approx(0.9 * v - v**2 / (2 * 0.5 * g), rel=1e-8)
+
+
 def test_a_belt_that_jumps_away_is_slipped_on_until_the_block_has_its_speed(built: Built) -> None:
     """The belt is set from rest to v = 1 m/s at once: one start of slipping, which lasts v/(mu g), and gives
     half of the work of the belt to the block."""

@@ -142,13 +142,22 @@ static Status release(Instance *x, double drift) {
     return OPTIONAL.modes_departures(s, SHORT / s->state.now.rate, drift);
 }
 
+static Status project_state(Solver *s) {
+    segment_begin(s);
+    return losses_project(s, segment_instant(s, s->state.now.t), 1);
+}
+
 /* The state back onto the rows that act. */
 static Status project(Instance *x) {
-    Solver *s = &x->solver;
-    if (s->system->m == 0) return OK;
-    segment_begin(s);
     x->observed = x->evaluated = 0;
-    return losses_project(s, segment_instant(s, s->state.now.t), 1);
+    return x->solver.system->m == 0 ? OK : project_state(&x->solver);
+}
+
+/* The state has been on the rows: what sticks slips where a motion has been moved away from it. */
+static Status leave_behind(Instance *x) {
+    Solver *s = &x->solver;
+    if (s->system->frictions == 0 || s->system->prescribed_count == 0) return OK;
+    return OPTIONAL.friction->slip_off(s, project_state);
 }
 
 /* What an importer has done to its inputs until now belongs to the step; what it does after, to the event. */
@@ -160,7 +169,7 @@ static Status come_back(Instance *x) {
 static Status pass_event(Instance *x) {
     Solver *s = &x->solver;
     int any, jumped;
-    if (release(x, 0) != OK) return FAILED;
+    if (release(x, 0) != OK || leave_behind(x) != OK) return FAILED;
     if (settle_jumps(x, &jumped) != OK || project(x) != OK || choose_rows(x) != OK) return FAILED;
     if (find_happened(x, &any) != OK) return FAILED;
     if (any || jumped) x->moved = 1; /* some integrators begin anew only then, from beyond the event if they do not */

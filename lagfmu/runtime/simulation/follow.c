@@ -18,21 +18,6 @@ static Status carry(Solver *s) {
                              s->state.span);
 }
 
-/* A motion that has jumped takes along what its rows hold, but not what only sticks to it: that slips. */
-static Status carry_off(Solver *s) {
-    const int count = s->system->frictions;
-    StickSlip *const modes = s->state.stick_slip, *loose = s->trial_modes;
-    struct FrictionForces *friction = s->stepped.friction;
-    for (int i = 0; i < count; i++) {
-        loose[i] = modes[i];
-        loose[i].sticks = 0;
-    }
-    friction->stick_slip = loose;
-    const Status carried = carry(s);
-    friction->stick_slip = modes;
-    return carried == OK ? OPTIONAL.friction->renew(s) : FAILED;
-}
-
 static Status follow_contacts(Solver *s) {
     return s->system->contacts + s->system->frictions == 0 ? OK : OPTIONAL.modes_contradicted(s);
 }
@@ -55,7 +40,7 @@ static Status follow_inputs(Solver *s, void *context, int c, double part) {
     (void)part;
     if (!s->state.now.ahead && s->system->switches > 0)
         OPTIONAL.switches->settle(s, segment_instant(s, s->state.now.t), s->state.q, s->state.v, NULL, NULL);
-    if (s->drive.jumped && s->system->frictions > 0 && carry_off(s) != OK) return FAILED;
+    if (s->drive.jumped && s->system->frictions > 0 && OPTIONAL.friction->slip_off(s, carry) != OK) return FAILED;
     if (s->system->prescribed_count > 0 && carry(s) != OK) return FAILED;
     if (s->system->frictions > 0 && OPTIONAL.friction->renew(s) != OK) return FAILED;
     if (!s->drive.turned) return OK;

@@ -166,9 +166,22 @@ static Status renew(Solver *s) {
     return OK;
 }
 
+static Status slip_off(Solver *s, Status (*carry)(Solver *s)) {
+    StickSlip *const modes = s->state.stick_slip, *loose = s->trial_modes;
+    struct FrictionForces *friction = s->stepped.friction;
+    for (int i = 0; i < s->system->frictions; i++) {
+        loose[i] = modes[i];
+        loose[i].sticks = 0;
+    }
+    friction->stick_slip = loose;
+    const Status carried = carry(s);
+    friction->stick_slip = modes;
+    return carried == OK ? renew(s) : FAILED;
+}
+
 SHARED_VALUE const FrictionEvents FRICTION_EVENTS = {
     .sliding = &SLIDING, .doubles = frictional_impact_doubles, .ints = frictional_impact_ints,
-    .begin = begin, .change = change, .stop = stop, .contradicted = contradicted, .renew = renew,
+    .begin = begin, .change = change, .stop = stop, .contradicted = contradicted, .renew = renew, .slip_off = slip_off,
     .indicators = slip_indicators, .range = slip_range,
     .turns = slip_turns, .turn = slip_turn,
     .work = slip_work, .jacobian = slip_jacobian, .impact = frictional_impact,

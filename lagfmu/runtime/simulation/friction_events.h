@@ -29,6 +29,8 @@ typedef struct {
     Status (*contradicted)(Solver *s, Instant at, int *left, int *any);
     /* Frictions that stuck, and of which an input has moved the surface away, slip. */
     Status (*renew)(Solver *s);
+    /* The same where motions jump: `carry` takes along what constraints hold, and what only sticks slips. */
+    Status (*slip_off)(Solver *s, Status (*carry)(Solver *s));
     /* Two indicators a friction, of the latest motion, and their ranges. */
     void (*indicators)(const Solver *s, double *values);
     Range (*range)(const Solver *s, int which);
