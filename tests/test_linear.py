@@ -587,26 +587,42 @@ def test_the_bound_of_the_condition_number_is_never_below_it(library, seed):
         assert bound == pytest.approx((3 if links > 2 else 2) * np.trace(inverse), rel=1e-9)
 
 
+def chain_in_space(links, rows_of_one, seed=3):
+    """M (n, n) and G (m, n) of bodies in a row, each held to the one before by so many rows; and C, the Schur
+    complement scaled to a unit diagonal."""
+    rng, w = np.random.default_rng(seed), rows_of_one
+    rows = np.zeros((w * links, w * links))
+    for k in range(links):
+        across, _ = np.linalg.qr(rng.normal(size=(w, w)))
+        rows[w * k : w * k + w, w * k : w * k + w] = across
+        if k > 0:
+            rows[w * k : w * k + w, w * k - w : w * k] = -across
+    full = np.diag(10 ** rng.uniform(-0.5, 0.5, w * links))
+    S = rows @ np.linalg.inv(full) @ rows.T
+    d = 1 / np.sqrt(np.diagonal(S))
+    return full, rows, S * d * d[:, None]
+
+
 def test_a_chain_of_bodies_in_space_is_as_well_conditioned_as_it_is(library):
     """Three rows a link, all on the same bodies: the condition is told by trace(C^-1), which grows like the
     square of the length, and by no factor of three a link."""
-    rng, links = np.random.default_rng(3), 40
-    rows = np.zeros((3 * links, 3 * links))
-    for k in range(links):
-        across, _ = np.linalg.qr(rng.normal(size=(3, 3)))
-        rows[3 * k : 3 * k + 3, 3 * k : 3 * k + 3] = across
-        if k > 0:
-            rows[3 * k : 3 * k + 3, 3 * k - 3 : 3 * k] = -across
-    full = np.diag(10 ** rng.uniform(-0.5, 0.5, 3 * links))
+    full, rows, scaled = chain_in_space(40, 3)
     bench = Bench(library, len(full), len(rows), *patterns(full, rows))
     bench.factor(full, rows)
-    S = rows @ np.linalg.inv(full) @ rows.T
-    d = 1 / np.sqrt(np.diagonal(S))
-    scaled = S * d * d[:, None]
-    widest = 9  # non-zeros in a row of S
-    bound = widest * np.trace(np.linalg.inv(scaled))
+    bound = np.abs(scaled).sum(axis=1).max() * np.trace(np.linalg.inv(scaled))
     assert library.bench_condition(bench.handle) == pytest.approx(bound, rel=1e-9)
     assert np.linalg.cond(scaled) < bound < 1e6
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_the_condition_of_an_arm_is_bounded_without_its_trace(library, seed):
+    """Six bodies, six rows a joint: the bound that costs next to nothing is above trace(C^-1), and below 1e6,
+    beyond which lambda would be refined."""
+    full, rows, scaled = chain_in_space(6, 6, seed)
+    bench = Bench(library, len(full), len(rows), *patterns(full, rows))
+    bench.factor(full, rows)
+    least = np.abs(scaled).sum(axis=1).max() * np.trace(np.linalg.inv(scaled))
+    assert least < library.bench_condition(bench.handle) < 1e6
 
 
 @pytest.mark.thorough

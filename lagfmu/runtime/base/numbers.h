@@ -7,6 +7,8 @@
 
 static inline double larger(double a, double b) { return a > b ? a : b; }
 
+static inline double smaller(double a, double b) { return a < b ? a : b; }
+
 static inline size_t larger_size(size_t a, size_t b) { return a > b ? a : b; }
 
 /* The largest |a_i| of a (n); 0 without any. */

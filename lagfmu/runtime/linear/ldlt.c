@@ -3,14 +3,15 @@
  * that costs next to nothing.
  *
  * C = R^-1 A R^-1 with R_i = sqrt(A_ii) has a unit diagonal.  Its norm is at most the number w of
- * non-zeros in a row, because |C_ij| <= 1; and the norm of its inverse is at most
+ * non-zeros in a row, because |C_ij| <= 1, and at most the largest sum_j |C_ij| (Gershgorin); and the norm of
+ * its inverse is at most
  *
  *   trace C^-1 = sum_i s_i / D_i ,    s_i = || row i of L^-1 R ||^2
  *
  * Row i of L^-1 is e_i minus the rows j that L_ij brings in, at most k_i of which overlap in a
  * column:
  *
- *   s_i <= A_ii + k_i sum_j L_ij^2 s_j
+ *   s_i <= A_ii + min(k_i sum_j L_ij^2 s_j , (sum_j |L_ij| sqrt s_j)^2)
  *
  * with equality where they do not overlap, as in a chain.  So w trace C^-1 is never below the
  * condition number; for a hanging chain of m equal links it is 3 m^2, where the condition number is
@@ -24,63 +25,81 @@
 #include <math.h>
 #include <stddef.h>
 
-/* Row p of L where none of the rows that enter it meet: L_pi = A_pi / D_i. */
-static double forest_row(const Elimination *e, double *L, const double *D, const double *row_size,
-                         int p, double *pivot) {
+#include "numbers.h"
+
+/* Row p of L where none of the rows that enter it meet: L_pi = A_pi / D_i.  Its pivot and s_p. */
+static double forest_row(const Elimination *e, double *L, const double *D, int p, const Bounds *own, double *pivot) {
     double size = *pivot, rest = *pivot;
     for (int k = e->start[p]; k < e->start[p + 1]; k++) {
         int i = e->column[k];
         double a = L[k], l = a * D[i];
         L[k] = l;
         rest -= a * l;
-        size += l * l * row_size[i];
+        size += l * l * own->size[i];
     }
     *pivot = rest;
-    return size;
+    return own->size[p] = size;
 }
 
 /* Row p of L by L y = a, a being row p of A: L_pi = y_i / D_i. */
-static double general_row(const Elimination *e, double *L, const double *D, const double *row_size,
-                          double *row, int p, double *pivot) {
-    double sum = 0, size = *pivot, rest = *pivot;
-    for (int k = e->start[p]; k < e->start[p + 1]; k++) {
-        int i = e->column[k];
+static double general_row(const Elimination *e, double *L, const double *D, int p, const Bounds *own, double *pivot) {
+    const double scale = 1 / sqrt(*pivot);
+    double squares = 0, sum = 0, norm = 0, rest = *pivot, size = *pivot;
+    double *row = own->row;
+    const int *column = e->column, from = e->start[p], to = e->start[p + 1];
+    for (int k = from; k < to; k++) {
+        const int i = column[k];
+        const double c = fabs(L[k]) * own->scale[i]; /* C_pi = A_pi / (R_p R_i) */
         double y = L[k];
-        for (int r = e->start[i]; r < e->start[i + 1]; r++) y -= L[r] * row[e->column[r]];
+        for (int r = e->start[i], end = e->start[i + 1]; r < end; r++) y -= L[r] * row[column[r]];
         row[i] = y;
-        double l = y * D[i];
+        const double l = y * D[i];
         L[k] = l;
         rest -= y * l;
-        sum += l * l * row_size[i];
+        const double part = fabs(l) * own->size[i];
+        squares += part * part;
+        sum += part;
+        norm += c;
+        own->norm[i] += c * scale;
     }
-    for (int k = e->start[p]; k < e->start[p + 1]; k++) row[e->column[k]] = 0;
+    for (int k = from; k < to; k++) row[column[k]] = 0;
+    own->scale[p] = scale;
+    own->norm[p] = 1 + norm * scale;
     *pivot = rest;
-    return size + e->overlap[p] * sum;
+    size += smaller(e->overlap[p] * squares, sum * sum);
+    own->size[p] = sqrt(size);
+    return size;
 }
 
-Definite ldlt_factor(const Elimination *e, double *L, double *D, double *row_size, double *row, const int *acts) {
-    Definite found = {HUGE_VAL, 1, -1};
+/* Of || C ||. */
+static double norm_bound(const Elimination *e, const Bounds *own) {
+    double norm = e->forest ? e->widest : 0;
+    for (int p = 0; p < e->size && !e->forest; p++) norm = larger(norm, own->norm[p]);
+    return smaller(norm, e->widest);
+}
+
+Definite ldlt_factor(const Elimination *e, double *L, double *D, const Bounds *own, const int *acts) {
+    Definite found = {HUGE_VAL, HUGE_VAL, 1, -1};
     double trace = 0;
     for (int p = 0; p < e->size; p++) {
         double diagonal = D[p], pivot = diagonal;
         if (acts != NULL && !acts[e->order[p]]) {
-            row_size[p] = 1;
+            own->size[p] = own->scale[p] = own->norm[p] = 1;
             trace += 1;
             continue;
         }
-        double size = e->forest ? forest_row(e, L, D, row_size, p, &pivot)
-                                : general_row(e, L, D, row_size, row, p, &pivot);
+        double size = e->forest ? forest_row(e, L, D, p, own, &pivot) : general_row(e, L, D, p, own, &pivot);
         if (!(pivot > 0 && pivot < HUGE_VAL)) {
             found.failed = p;
             return found;
         }
         double inverse = 1 / pivot;
         D[p] = inverse;
-        row_size[p] = size;
         trace += size * inverse;
         if (diagonal * inverse > found.growth) found.growth = diagonal * inverse;
     }
-    if (trace < HUGE_VAL) found.bound = e->widest * trace;
+    found.norm = norm_bound(e, own);
+    if (trace < HUGE_VAL) found.bound = found.norm * trace;
     return found;
 }
 

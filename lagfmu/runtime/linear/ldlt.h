@@ -8,16 +8,21 @@
 /* What is known of the condition of a matrix that was factored. */
 typedef struct {
     double bound;  /* of its 2-norm condition number, scaled to a unit diagonal: never below it */
+    double norm;   /* of the norm of the scaled matrix */
     double growth; /* largest A_pp / D_p: how much of a diagonal element cancelled at worst */
     int failed;    /* position whose pivot is not positive and finite (bound: infinity), or -1 */
 } Definite;
 
+/* Scratch (size) of the bounds: of a row of L^-1 R its squared norm s, in a forest, or else its norm; 1 / R and the sums
+ * of |C|, which a forest does not ask for; a row of L, zero between calls. */
+typedef struct {
+    double *size, *scale, *norm, *row;
+} Bounds;
+
 /* In place: on entry L holds A's elements below the diagonal in the pattern of L and D its
- * diagonal, in the order of elimination; on return L, and 1 / D.  `row_size` and `row` are scratch
- * (size), `row` zero on entry and return.  `acts` (size; NULL: all): 0 for what is passed over, a row of A, by its
- * own number, that is nothing but a 1 on the diagonal. */
-SHARED Definite ldlt_factor(const Elimination *e, double *L, double *D, double *row_size, double *row,
-                            const int *acts);
+ * diagonal, in the order of elimination; on return L, and 1 / D.  `acts` (size; NULL: all): 0 for what is passed
+ * over, a row of A, by its own number, that is nothing but a 1 on the diagonal. */
+SHARED Definite ldlt_factor(const Elimination *e, double *L, double *D, const Bounds *own, const int *acts);
 
 /* Scratch of ldlt_trace(): derivatives of log det A by the elements of L (its pattern), D and y (size); y (size), zero
  * on entry and return. */

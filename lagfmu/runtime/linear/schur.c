@@ -17,7 +17,6 @@
 #include <float.h>
 #include <math.h>
 
-#include "ldlt.h"
 #include "numbers.h"
 #include "refinement.h"
 
@@ -45,15 +44,17 @@ void schur_layout(Linear *l, Arena *arena) {
     at.lower = arena_doubles(arena, plan->schur.start[plan->schur.size]);
     at.inverse = arena_doubles(arena, s->m);
     at.diagonal = arena_doubles(arena, s->m);
-    at.row_size = arena_doubles(arena, full);
-    at.row = arena_doubles(arena, full);
+    at.bounds.size = arena_doubles(arena, full);
+    at.bounds.scale = arena_doubles(arena, full);
+    at.bounds.norm = arena_doubles(arena, full);
+    at.bounds.row = arena_doubles(arena, full);
     at.reverse = arena_doubles(arena, plan->schur.forest ? 0 : plan->schur.start[plan->schur.size]);
     at.y = arena_doubles(arena, s->nv);
     at.z = arena_doubles(arena, s->m);
     at.lambda = arena_doubles(arena, s->m);
     at.trust = SCHUR_UNSAFE;
     if (arena->base == NULL) return;
-    for (int i = 0; i < full; i++) at.row[i] = 0;
+    for (int i = 0; i < full; i++) at.bounds.row[i] = 0;
     *own = at;
     l->sparse = (double *)(void *)own;
 }
@@ -76,8 +77,7 @@ static int factor_masses(const Plan *plan, Schur *own, const double *M) {
     for (int p = 0; p < e->size; p++) own->inverse_mass[p] = M[plan->mass_diagonal[p]];
     for (int k = 0; k < e->start[e->size]; k++)
         own->mass_lower[k] = plan->mass_value[k] < 0 ? 0 : M[plan->mass_value[k]];
-    Definite found =
-        ldlt_factor(e, own->mass_lower, own->inverse_mass, own->row_size, own->row, NULL);
+    Definite found = ldlt_factor(e, own->mass_lower, own->inverse_mass, &own->bounds, NULL);
     own->condition = found.bound;
     own->growth = found.growth;
     if (found.failed >= 0) own->doubtful_mass = e->order[found.failed];
@@ -87,23 +87,25 @@ static int factor_masses(const Plan *plan, Schur *own, const double *M) {
 /* Row k of W by L w = P g_k, forward through its non-zeros alone. */
 static void eliminate_row(const Plan *plan, Schur *own, const double *G, int k) {
     const Elimination *e = &plan->mass;
-    double *w = own->row;
-    for (int a = plan->w_start[k]; a < plan->w_start[k + 1]; a++) {
-        int p = plan->w_column[a];
-        double sum = plan->w_value[a] < 0 ? 0 : G[plan->w_value[a]];
+    const int from = plan->w_start[k], to = plan->w_start[k + 1];
+    double *w = own->bounds.row;
+    for (int a = from; a < to; a++) {
+        const int p = plan->w_column[a], value = plan->w_value[a];
+        double sum = value < 0 ? 0 : G[value];
         for (int r = e->start[p]; r < e->start[p + 1]; r++)
             sum -= own->mass_lower[r] * w[e->column[r]];
         w[p] = own->w_own[a] = sum;
     }
-    for (int a = plan->w_start[k]; a < plan->w_start[k + 1]; a++) w[plan->w_column[a]] = 0;
+    for (int a = from; a < to; a++) w[plan->w_column[a]] = 0;
 }
 
 /* D^-1 W and S_kk of row k. */
 static double scale_row(const Schur *own, int k) {
-    double sum = 0;
-    for (int a = own->w_start[k]; a < own->w_start[k + 1]; a++) {
-        own->h[a] = own->w[a] * own->inverse_mass[own->w_column[a]];
-        sum += own->w[a] * own->h[a];
+    double *h = own->h, sum = 0;
+    for (int a = own->w_start[k], to = own->w_start[k + 1]; a < to; a++) {
+        const double w = own->w[a];
+        h[a] = w * own->inverse_mass[own->w_column[a]];
+        sum += w * h[a];
     }
     return sum;
 }
@@ -135,14 +137,16 @@ int schur_masses(Linear *l, int zero_rows) {
 /* S below the diagonal, and its diagonal, in the order of elimination. */
 static void assemble(const Plan *plan, Schur *own, const int *acts) {
     const Elimination *e = &plan->schur;
+    const int *left = plan->pair_a, *right = plan->pair_b;
+    const double *w = own->w, *h = own->h;
     for (int p = 0; p < e->size; p++) {
         const int there = acts == NULL || acts[e->order[p]];
         own->inverse[p] = own->diagonal[e->order[p]];
         for (int k = e->start[p]; k < e->start[p + 1]; k++) {
             double sum = 0;
             if (there && (acts == NULL || acts[e->order[e->column[k]]]))
-                for (int a = plan->pair_start[k]; a < plan->pair_start[k + 1]; a++)
-                    sum += own->w[plan->pair_a[a]] * own->h[plan->pair_b[a]];
+                for (int a = plan->pair_start[k], to = plan->pair_start[k + 1]; a < to; a++)
+                    sum += w[left[a]] * h[right[a]];
             own->lower[k] = sum;
         }
     }
@@ -158,12 +162,15 @@ static Trust judge(const Linear *l, double bound, double growth) {
     return l->dense == NULL && bound < HUGE_VAL ? SCHUR_DOUBLED : SCHUR_UNSAFE;
 }
 
+/* Whether a bound that costs more may tell that S can be trusted as it is, or at all. */
+static int matters(double bound, double growth) { return bound > (growth <= LITTLE ? PLAIN : DOUBLED); }
+
 /* The condition of S by the trace of its inverse, which is never below it either. */
-static double traced(const Linear *l) {
+static double traced(const Linear *l, double norm) {
     const Schur *own = schur_of(l);
     const Elimination *e = &l->system->plan->schur;
-    const Reverse scratch = {own->reverse, own->z, own->row_size, own->row};
-    return e->widest * ldlt_trace(e, own->lower, own->inverse, own->diagonal, l->some, &scratch);
+    const Reverse scratch = {own->reverse, own->z, own->bounds.size, own->bounds.row};
+    return norm * ldlt_trace(e, own->lower, own->inverse, own->diagonal, l->some, &scratch);
 }
 
 int schur_factor(Linear *l) {
@@ -174,12 +181,11 @@ int schur_factor(Linear *l) {
     if (!schur_masses(l, 0)) return 0;
     if (l->system->m > 0) {
         assemble(plan, own, l->some);
-        Definite found =
-            ldlt_factor(&plan->schur, own->lower, own->inverse, own->row_size, own->row, l->some);
+        Definite found = ldlt_factor(&plan->schur, own->lower, own->inverse, &own->bounds, l->some);
         if (found.failed >= 0) own->doubtful_row = plan->schur.order[found.failed];
         own->growth = larger(own->growth, found.growth);
-        if (found.bound > DOUBLED && found.failed < 0 && !plan->schur.forest)
-            found.bound = larger(traced(l), found.growth);
+        if (found.failed < 0 && !plan->schur.forest && matters(found.bound, own->growth))
+            found.bound = larger(traced(l, found.norm), found.growth);
         own->condition = larger(own->condition, found.bound);
         own->apart = found.failed < 0 ? 1 / sqrt(found.growth) : 0;
     }
@@ -214,14 +220,15 @@ void schur_back(const Linear *l, double *y, double *x) {
 static void constrain(const Linear *l, const double *c, double *y, double *lambda) {
     const Schur *own = schur_of(l);
     const Elimination *e = &l->system->plan->schur;
+    const int *start = own->w_start, *column = own->w_column;
     double *z = own->z;
     for (int p = 0; p < e->size; p++) { /* L' z = c - W^T y */
         int k = e->order[p];
         z[p] = 0;
         if (!l->active[k]) continue;
         double sum = c[k];
-        for (int a = own->w_start[k]; a < own->w_start[k + 1]; a++) sum -= own->w[a] * y[own->w_column[a]];
-        for (int a = e->start[p]; a < e->start[p + 1]; a++) sum -= own->lower[a] * z[e->column[a]];
+        for (int a = start[k], to = start[k + 1]; a < to; a++) sum -= own->w[a] * y[column[a]];
+        for (int a = e->start[p], to = e->start[p + 1]; a < to; a++) sum -= own->lower[a] * z[e->column[a]];
         z[p] = sum;
     }
     for (int p = 0; p < e->size; p++) z[p] *= own->inverse[p];
@@ -229,10 +236,9 @@ static void constrain(const Linear *l, const double *c, double *y, double *lambd
         int k = e->order[p];
         lambda[k] = 0;
         if (l->some != NULL && !l->some[k]) continue;
-        for (int a = e->start[p]; a < e->start[p + 1]; a++) z[e->column[a]] -= own->lower[a] * z[p];
-        for (int a = own->w_start[k]; a < own->w_start[k + 1]; a++)
-            y[own->w_column[a]] += own->h[a] * z[p];
-        lambda[k] = z[p];
+        const double known = lambda[k] = z[p];
+        for (int a = e->start[p], to = e->start[p + 1]; a < to; a++) z[e->column[a]] -= own->lower[a] * known;
+        for (int a = start[k], to = start[k + 1]; a < to; a++) y[column[a]] += own->h[a] * known;
     }
 }
 

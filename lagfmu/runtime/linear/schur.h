@@ -2,6 +2,7 @@
 #ifndef LAGFMU_SCHUR_H
 #define LAGFMU_SCHUR_H
 
+#include "ldlt.h"
 #include "linear.h"
 #include "linkage.h"
 
@@ -23,7 +24,7 @@ typedef struct {
     double *h;                 /* D^-1 W of rows that act */
     double *lower, *inverse;   /* S = L' D' L'^T: L' and 1 / D' (m) */
     double *diagonal;          /* (m) S_kk by rows of G; 1 where a row does not act */
-    double *row_size, *row;    /* (max(nv, m)) scratch of ldlt.c; row is zero between calls */
+    Bounds bounds;             /* (max(nv, m)) scratch of ldlt.c */
     double *reverse;           /* scratch of ldlt_trace() in the pattern of L' */
     double *y, *z;             /* (nv), (m) scratch of schur_solve() */
     double *lambda;            /* (m) where the caller asks for none */

@@ -6,6 +6,7 @@
 #include "step_size.h"
 
 #include "digits.h"
+#include "numbers.h"
 
 #include <limits.h>
 #include <string.h>
@@ -60,10 +61,6 @@ static double second_derivative(Integrator *i, const Ode *ode, const Control *co
         return isfinite(size) ? size : 0;
     }
     return 0;
-}
-
-static double smaller(double a, double b) {
-    return a < b ? a : b;
 }
 
 /* h0: Euler's step changes y by 0.01 of its size.  h1: (h1/tau)^(order + 1) max(tau |y'|, tau^2 |y''|)
