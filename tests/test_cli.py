@@ -328,6 +328,17 @@ def test_help_and_version_are_told_without_waiting(words):
     assert run.stdout
 
 
+def test_a_native_build_loads_no_integrators():
+    """SciPy's are those of the reference engine; its splines are loaded with the first table."""
+    code = (
+        "import sys, lagfmu.api\n"
+        "heavy = {f'scipy.{x}' for x in ('integrate', 'interpolate', 'optimize')} | {'matplotlib'}\n"
+        "assert not heavy & sys.modules.keys(), heavy & sys.modules.keys()\n"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert run.returncode == 0, run.stderr
+
+
 @pytest.mark.parametrize("interrupted", ["typer", "sympy"])
 def test_ctrl_c_while_it_is_loading_ends_without_a_traceback(interrupted):
     """Half of a short command's time goes by before it begins."""

@@ -54,6 +54,8 @@ HOT = {  # where the time of a step and of a communication point goes; all else 
     *("segment.c", "state.c", "observe.c", "minimum_gap.c", "system.c"),
 }
 
+HINTED = "-finline-hint-functions"  # clang: inline what is declared so, not each helper at each of its calls
+
 SHARED = ("-shared", "-s", "-Os")  # -Os is for what the compiler adds of its own
 NO_UNWINDING = (
     "-fno-asynchronous-unwind-tables",
@@ -306,7 +308,9 @@ def _compile(compiler: Compiler, target: str, file: str, made: str, folder: str)
 
 
 def _flags(compiler: Compiler, target: str, file: str) -> tuple[str, ...]:
-    speed = (FAST,) if file in HOT else SMALL if compiler.cross else SMALL[:1]
+    speed: tuple[str, ...] = (FAST,) if file in HOT else SMALL if compiler.cross else SMALL[:1]
+    if file == "model.c" and compiler.cross:
+        speed += (HINTED,)
     flags = (*FLAGS, *speed) if _suffix(target) == ".dll" else (*FLAGS, *speed, *NO_UNWINDING)
     if _suffix(target) == WASM.suffix:
         flags = tuple(f for f in flags if f != "-fPIC")

@@ -20,7 +20,6 @@ from ..prepare.prepare import Prepared
 from .archive import pack, version
 from .description import model_description
 from .slave import script
-from .slave.fmi2 import LagfmuSlave
 from .target import missing_for_native
 
 SHIPPED = (
@@ -146,6 +145,8 @@ def offered(prepared: Prepared) -> VariableTable:
 
 def slave_of(prepared: Prepared) -> Any:
     """What the FMU's script makes an instance of, for this process.  Raises BuildError."""
+    from .slave.fmi2 import LagfmuSlave  # and with it the solver
+
     table = offered(prepared)
     rows = tuple(script.Variable(*_row(v)) for v in table.variables)
     return type(

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
+from sympy.utilities.iterables import connected_components
 
 from .equations import EquationsOfMotion
 
@@ -28,11 +26,8 @@ def constrained_together(eom: EquationsOfMotion) -> list[Group]:
 
 def _tied(eom: EquationsOfMotion, pairs: list[tuple[int, int]]) -> list[Group]:
     pairs = [*pairs, *((eom.nv + k, j) for k, j in eom.G.todok())]
-    size = eom.nv + eom.m
-    i, j = np.array(pairs, dtype=int).reshape(-1, 2).T
-    count, of = connected_components(coo_array((np.ones(len(i)), (i, j)), (size, size)))
-    groups = [np.flatnonzero(of == g).tolist() for g in range(count)]
+    groups = connected_components((range(eom.nv + eom.m), pairs))
     return [
         (frozenset(i for i in g if i < eom.nv), frozenset(i - eom.nv for i in g if i >= eom.nv))
-        for g in groups
+        for g in sorted(groups, key=min)
     ]

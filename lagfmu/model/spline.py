@@ -21,7 +21,6 @@ from typing import Any
 
 import numpy as np
 import sympy as sp
-from scipy.interpolate import CubicSpline
 
 from ..errors import LagfmuWarning, TableError, UnitError
 from ..numeric.cubic import Cubic
@@ -166,6 +165,8 @@ def splines_in(expressions: Iterable[Expr]) -> list[Spline]:
 
 
 def _table(x: Sequence[float], y: Sequence[float], ends: str) -> Cubic:
+    from scipy.interpolate import CubicSpline
+
     spline = CubicSpline(x, y, bc_type=ends)
     rows = [tuple(float(c) for c in row[::-1]) for row in spline.c.T]
     rows.append((float(y[-1]), float(spline(x[-1], 1)), 0.0, 0.0))

@@ -17,7 +17,6 @@ from .. import names
 from ..errors import SettingError, SimulationError
 from ..fmu import native
 from ..fmu.exchange import by_fmpy
-from ..fmu.inprocess import InProcess
 from ..fmu.inputs import check_inputs, columns_at, jumps
 from ..fmu.read import (
     Trajectory,
@@ -126,6 +125,8 @@ class _Asked:
 def _of_model(prepared: Prepared, target: str, asked: _Asked) -> Result:
     name = prepared.scene.name
     if target == PYTHON:
+        from ..fmu.inprocess import InProcess  # and with it the solver, which no native FMU needs
+
         with Session(InProcess(prepared), log=True) as session:
             run = _run(session, name, asked)
         if run.refusal is not None:

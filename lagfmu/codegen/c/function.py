@@ -221,7 +221,8 @@ def _signature(
         for a, s in arguments.items()
     ]
     declared += [f"double *{a}" for a in results]
-    head = f"static void {name}("
+    called = " inline" if name.endswith("dynamics") else ""  # by accelerate (solve.py)
+    head = f"static{called} void {name}("
     return _lines(head, declared, ", ", ") {", " " * len(head))
 
 

@@ -61,9 +61,9 @@ static double cubic(const Cubic *table, int order, double x) {
 }
 """
 HELPERS = {  # what <math.h> has not; printed into a file that calls it
-    "sign": "static double sign(double x) {\n    return (x > 0.0) - (x < 0.0);\n}\n",
+    "sign": "static inline double sign(double x) {\n    return (x > 0.0) - (x < 0.0);\n}\n",
     "heaviside": (
-        "static double heaviside(double x, double at_zero) {\n"
+        "static inline double heaviside(double x, double at_zero) {\n"
         "    return x > 0.0 ? 1.0 : x < 0.0 ? 0.0 : at_zero;\n}\n"
     ),
     "cubic": CUBIC,

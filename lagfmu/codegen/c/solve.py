@@ -31,8 +31,8 @@ def solve_source(name: str, n: int, entries: Sequence[tuple[int, int]], plan: Pl
     head = (
         "/* x, lambda of  M x = b + G^T lambda,  G x = c  with all rows acting: the elimination of the\n"
         " * plan written out; 0 where it is not safe. */\n"
-        f"static int {name}(const double *M, const double *b, const double *G, const double *c,\n"
-        f"{' ' * (len(name) + 12)}double *x, double *lambda) {{\n"
+        f"static inline int {name}(const double *M, const double *b, const double *G, const double *c,\n"
+        f"{' ' * (len(name) + 19)}double *x, double *lambda) {{\n"
     )
     unused = "" if plan.schur.size else "    (void)G; (void)c; (void)lambda;\n"
     return head + unused + "".join(_wrapped(line) for line in lines) + "}\n"
