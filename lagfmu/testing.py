@@ -21,6 +21,7 @@ from .fmu import compiler, described
 from .fmu import target as targets
 from .fmu.archive import version as archive_version
 from .fmu.batch import LAST, MAX, MEAN, TIME_OF_MAX, Plan, in_session, run_batch
+from .fmu.bundle import bundled, reached, unbundled
 from .fmu.closed_forms import CarriedForm, carried, pack_closed_forms, unpack_closed_forms
 from .fmu.compiler import NAMES, PLATFORMS, chosen, compile_libraries, find_compiler, host
 from .fmu.description import model_description

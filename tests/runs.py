@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import tempfile
+import zipfile
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import fmpy
+
+from lagfmu.testing import unbundled
 
 FOLDERS: list[tempfile.TemporaryDirectory[str]] = []  # each goes with this process
 
@@ -25,6 +28,13 @@ def evenly(
     step = stop / points
     sizes = {"stop_time": stop, "step_size": step, "output_interval": step}
     return simulate_fmu(path, relative_tolerance=tolerance, start_values=start, **sizes, **options)
+
+
+def sources(path: str | Path) -> dict[str, bytes]:
+    """The C files that an FMU carries, of the runtime and of its own, by name."""
+    with zipfile.ZipFile(path) as archive:
+        carried = [n for n in archive.namelist() if n.startswith("sources/")]
+        return unbundled({n.removeprefix("sources/"): archive.read(n) for n in carried})
 
 
 def unpacked(path: str | Path) -> tuple[str, Any]:

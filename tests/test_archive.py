@@ -67,7 +67,7 @@ def test_a_damaged_member_is_one_message(native_fmu, tmp_path, command):
         entries = [e for e in archive.infolist() if e.compress_size > 100]
     path = tmp_path / "X.fmu"
     words = {"sweep": ["--vary", "m1=1,2"], "page": ["-o", str(tmp_path / "x.html")]}
-    read = ("modelDescription.xml", "sources/lagfmu.c" if command == "page" else "binaries/")
+    read = ("modelDescription.xml", "sources/runtime.c" if command == "page" else "binaries/")
     for entry in entries:
         if not entry.filename.startswith(read):
             continue

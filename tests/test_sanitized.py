@@ -19,7 +19,7 @@ from test_jumps import MODELS as JUMPS
 from test_speeds_native import ball, geared
 
 from lagfmu import Model, Peak, Scene
-from lagfmu.testing import GENERATED
+from lagfmu.testing import GENERATED, unbundled
 
 pytestmark = pytest.mark.filterwarnings("ignore::lagfmu.testing.RedundantConstraintWarning")
 SCENARIO = Path(__file__).parent / "scenario.c"
@@ -94,10 +94,14 @@ def unpacked(native_fmu, built):
 def program(folder: Path, name: str, flags: tuple[str, ...], importer: Path = SCENARIO) -> Path:
     """The importer with the FMU's generated sources and what it holds of the runtime, which is the same for
     every FMU."""
-    sources = folder / "sources"
-    carried = sorted(p for p in sources.glob("*.c") if p.name != "all.c")
-    held = [p.name for p in carried if p.name not in MADE]
-    generated = [str(p) for p in carried if p.name in MADE]
+    sources = folder / "unbundled"
+    sources.mkdir(exist_ok=True)
+    files = unbundled({p.name: p.read_bytes() for p in (folder / "sources").iterdir()})
+    for file, text in files.items():
+        (sources / file).write_bytes(text)
+    carried = sorted(f for f in files if f.endswith(".c") and f != "all.c")
+    held = [f for f in carried if f not in MADE]
+    generated = [str(sources / f) for f in carried if f in MADE]
     target = folder / f"{name}_{len(flags)}"
     linked = objects([importer, *(RUNTIME_FILES[file] for file in held)], flags)
     command = [compiler(), *FLAGS, *flags, "-Werror", f"-I{sources}", "-o", str(target)]

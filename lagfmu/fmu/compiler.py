@@ -25,6 +25,7 @@ from functools import cache
 from pathlib import Path
 
 from ..errors import BuildError, TemporaryFolderError, UsageError
+from .bundle import reached
 
 HOST, ALL = "host", "all"
 TIMEOUT = 600  # seconds for one call of the compiler
@@ -258,7 +259,7 @@ def _cached(place: Path) -> bytes | None:
 
 
 def _places(compiler: Compiler, target: str, runtime: Mapping[str, bytes]) -> dict[str, Path]:
-    """Where the objects are: named by compiler, platform, flags, all headers and the file's content."""
+    """Where the objects are: named by compiler, platform, flags, and what the file holds and includes."""
     common = hashlib.sha256()
 
     def take(digest: hashlib._Hash, *parts: bytes) -> str:
@@ -267,12 +268,11 @@ def _places(compiler: Compiler, target: str, runtime: Mapping[str, bytes]) -> di
         return digest.hexdigest()[:24]
 
     take(common, compiler.identity.encode(), target.encode())
-    for file in sorted(f for f in runtime if f.endswith(".h")):
-        take(common, file.encode(), runtime[file])
     places = {}
     for file in sorted(f for f in runtime if f.endswith(".c")):
         flags = map(str.encode, _flags(compiler, target, file))
-        name = take(common.copy(), file.encode(), *flags, runtime[file])
+        texts = (part for f in reached(runtime, [file]) for part in (f.encode(), runtime[f]))
+        name = take(common.copy(), *flags, *texts)
         places[file] = _cache() / f"{file[:-2]}-{target or 'host'}-{name}.object"
     return places
 

@@ -99,16 +99,17 @@ class Unknown:
     known: Sequence[str] | None  # None: not told, which means on all
 
     def attributes(self, places: Mapping[str, int]) -> dict[str, str]:
-        """Dependencies and their kinds, by the numbers in `places`; what is not there is not known."""
+        """Dependencies, by the numbers in `places`, and their kinds: "constant" or "dependent", as FMI takes
+        them where nothing is said.  What is not there is not known."""
         if self.known is None:
             return {}
-        known = sorted(
-            (places[n], "constant" if n == self.name else "dependent")
-            for n in self.known
-            if n in places
-        )
-        found = {"dependencies": " ".join(str(k) for k, _ in known)}
-        return found | ({"dependenciesKind": " ".join(kind for _, kind in known)} if known else {})
+        known = sorted(places[n] for n in self.known if n in places)
+        found = {"dependencies": " ".join(map(str, known))}
+        own = places.get(self.name)
+        if own not in known:
+            return found
+        kinds = ("constant" if k == own else "dependent" for k in known)
+        return found | {"dependenciesKind": " ".join(kinds)}
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,9 @@ from .moving import Moving, in_order
 from .view import View
 
 SIDE, DOTS = 1.28, 100  # in, and dots an inch
+HUNDREDTH = re.compile(
+    rb"(\d+\.\d\d)\d+"
+)  # of a point: further digits of a place are seen by nobody
 FORCES = ("arrow", "direction")  # shapes that are no bodies
 
 
@@ -28,7 +32,7 @@ def icon(prepared: Prepared) -> dict[str, bytes]:
     for s in () if picture is None else picture["shapes"]:
         if s["kind"] not in FORCES and names_in(s) <= places.keys():
             shapes.append(Moving(s, places.__getitem__, 1))
-    return {f"{ICON}.{kind}": _drawn(shapes, kind) for kind in ("png", "svg")} if shapes else {}
+    return _drawn(shapes) if shapes else {}
 
 
 def _places(prepared: Prepared) -> dict[str, float]:
@@ -40,7 +44,7 @@ def _places(prepared: Prepared) -> dict[str, float]:
     return known | dict(zip(at.system.coordinates, q.tolist(), strict=True)) | {"time": 0.0}
 
 
-def _drawn(shapes: list[Moving], kind: str) -> bytes:
+def _drawn(shapes: list[Moving]) -> dict[str, bytes]:
     """The same bytes for the same shapes."""
     import matplotlib
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -53,8 +57,12 @@ def _drawn(shapes: list[Moving], kind: str) -> bytes:
     view.set(axes, np.empty((0, 3)))
     for shape in in_order(shapes, 0):
         view.draw(axes, shape, 0)
-    file = io.BytesIO()
-    undated = {"Software": None} if kind == "png" else {"Date": None, "Creator": None}
+    pixels, lines = io.BytesIO(), io.BytesIO()
+    untold = dict.fromkeys(("Date", "Creator", "Format", "Type"))
     with matplotlib.rc_context({"svg.hashsalt": "lagfmu"}):
-        figure.savefig(file, format=kind, transparent=True, metadata=undated)
-    return file.getvalue()
+        figure.savefig(pixels, format="png", transparent=True, metadata={"Software": None})
+        figure.savefig(lines, format="svg", transparent=True, metadata=untold)
+    return {
+        f"{ICON}.png": pixels.getvalue(),
+        f"{ICON}.svg": HUNDREDTH.sub(rb"\1", lines.getvalue()),
+    }

@@ -9,6 +9,7 @@ from typing import Any
 
 from ..errors import BuildError
 from ..fmu.archive import opened
+from ..fmu.bundle import unbundled
 from ..fmu.native import GENERATED, IDENTITY, sources_of
 from ..fmu.read import read_description
 from ..fmu.write import PAGE
@@ -66,14 +67,16 @@ def _told_by_prepared(prepared: Prepared) -> Told:
         for s in typeset(prepared.form)
     ]
     preset = presets.preset_of(prepared)
-    return Told(made.description, sections, picture_of(prepared), preset, made.shipped)
+    return Told(
+        made.description, sections, picture_of(prepared), preset, {**made.runtime, **made.generated}
+    )
 
 
 def _told_by_fmu(path: Path) -> Told:
     read_description(path)  # that it is an FMU
     with opened(path) as archive:
         names = archive.namelist()
-        sources = {
+        carried = {
             Path(n).name: archive.read(n)
             for n in names
             if n.startswith("sources/") and n.endswith((".c", ".h"))
@@ -83,4 +86,4 @@ def _told_by_fmu(path: Path) -> Told:
         own = presets.IN_FMU
         preset = presets.read_preset(archive.read(own)) if own in names else None
         description = archive.read("modelDescription.xml")
-        return Told(description, equations_of(page), picture, preset, sources)
+        return Told(description, equations_of(page), picture, preset, unbundled(carried))

@@ -1,9 +1,9 @@
 /* linkage.h -- names that the runtime's files share with each other, and with nobody else.
  *
- * Compiled file by file they have external linkage.  In an FMU's sources one file, all.c, includes all others:
- * there they are static, so that nothing but the interface is exported, and two FMUs link into one program
- * (FMI 2.0.5, sect. 2.1.1: a prefix of its functions).  A function is declared SHARED; a value too, and its definition
- * is SHARED_VALUE. */
+ * Compiled file by file they have external linkage.  An FMU's sources are compiled as one file, all.c: there
+ * they are static, so that nothing but the interface is exported, and two FMUs link into one program (FMI 2.0.5,
+ * sect. 2.1.1: a prefix of its functions).  A function is declared SHARED; a value too, and its definition is
+ * SHARED_VALUE. */
 #ifndef LAGFMU_LINKAGE_H
 #define LAGFMU_LINKAGE_H
 
