@@ -48,7 +48,6 @@ from .live.moving import Moving
 from .live.playable import playable, told_by
 from .live.render import Playable, render
 from .mechanics import simplification
-from .mechanics.differential import Differential
 from .mechanics.form import Form
 from .mechanics.formulations.minimal import reduce
 from .mechanics.formulations.nullspace import lambda_free, null_space
@@ -56,6 +55,7 @@ from .mechanics.integrability.classify import Kind, pfaffian
 from .mechanics.jumps import jumps_of, with_jumps
 from .model.attitude import Carried, rotation_matrix, written_out
 from .model.closed_form import TIME
+from .model.differential import Differential
 from .model.expression import LONGEST_SUM, read_formula, text_of
 from .model.file import ModelFile, load
 from .model.formula import with_outputs

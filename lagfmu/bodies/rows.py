@@ -18,6 +18,7 @@ from sympy.physics.vector import dynamicsymbols
 
 from ..model.alike import Pattern, Place, pattern
 from ..model.closing import Closing, computed
+from ..model.differential import Differential
 from ..model.elements import Constraint, Expr, Nonholonomic, Tie
 from ..model.model import Model
 
@@ -102,7 +103,11 @@ class _Function:
         symbols, groups = kind.pattern.symbols, kind.pattern.groups
         value, rate = kind.pattern.values
         v = [s for s, group in zip(symbols, groups, strict=True) if group == "v"]
-        parts = [value, rate.xreplace(dict.fromkeys(v, sp.S.Zero)), *(rate.diff(s) for s in v)]
+        parts = [
+            value,
+            rate.xreplace(dict.fromkeys(v, sp.S.Zero)),
+            *(Differential({s: sp.S.One})(rate) for s in v),
+        ]
         numbers = count()
         self._closing = Closing(lambda letter: f"{letter}{next(numbers)}")
         self.parts, places = self._closing.opened(parts)

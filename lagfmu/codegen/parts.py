@@ -16,11 +16,11 @@ from typing import Any
 
 import sympy as sp
 
-from ..mechanics.differential import Differential
 from ..mechanics.equations import TIME, EquationsOfMotion, formulas_of
 from ..mechanics.form import Form
 from ..mechanics.formulations.minimal import Reduction
 from ..mechanics.jumps import NONE, Jumps
+from ..model.differential import Differential
 from ..model.elements import Expr
 from ..model.model import Constraint, Contact, Nonholonomic
 from ..model.units import ONE, SECOND, Unit

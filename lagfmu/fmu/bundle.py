@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
+from functools import lru_cache
 
 BUNDLE = "runtime.c"
 INCLUDE = re.compile(rb'^#include "(\w+\.[ch])"$', re.MULTILINE)
@@ -20,6 +21,11 @@ NAME = "\n/* ======== {} ======== */\n"
 NAMED = re.compile(rb"\n/\* ======== (\w+\.[ch]) ======== \*/\n")
 
 
+@lru_cache(maxsize=1024)
+def _includes(text: bytes) -> tuple[str, ...]:
+    return tuple(file.decode() for file in INCLUDE.findall(text))
+
+
 def reached(files: Mapping[str, bytes], begin: Iterable[str]) -> list[str]:
     """Those of `files` that the ones in `begin` include, and these; each behind all that it includes."""
     found: dict[str, None] = {}
@@ -27,8 +33,8 @@ def reached(files: Mapping[str, bytes], begin: Iterable[str]) -> list[str]:
     def visit(file: str) -> None:
         if file in found or file not in files:
             return
-        for other in INCLUDE.findall(files[file]):
-            visit(other.decode())
+        for other in _includes(files[file]):
+            visit(other)
         found[file] = None
 
     for file in begin:

@@ -21,7 +21,7 @@ import tempfile
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 
 from ..errors import BuildError, TemporaryFolderError, UsageError
@@ -271,10 +271,14 @@ def _places(compiler: Compiler, target: str, runtime: Mapping[str, bytes]) -> di
     places = {}
     for file in sorted(f for f in runtime if f.endswith(".c")):
         flags = map(str.encode, _flags(compiler, target, file))
-        texts = (part for f in reached(runtime, [file]) for part in (f.encode(), runtime[f]))
-        name = take(common.copy(), *flags, *texts)
+        name = take(common.copy(), *flags, *(_digest(runtime[f]) for f in reached(runtime, [file])))
         places[file] = _cache() / f"{file[:-2]}-{target or 'host'}-{name}.object"
     return places
+
+
+@lru_cache(maxsize=1024)
+def _digest(text: bytes) -> bytes:
+    return hashlib.sha256(text).digest()
 
 
 def _cache() -> Path:

@@ -21,6 +21,7 @@ import sympy as sp
 from sympy.physics.vector import dynamicsymbols
 
 from ..errors import ModelError
+from ..model.differential import Differential
 from ..model.display import Displayed
 from ..model.elements import Expr, Tie
 from ..model.model import Constraint, Friction, Model, Nonholonomic, Output, Parameter, name_of
@@ -31,7 +32,6 @@ from ..model.spline import Spline, SplineBase
 from ..model.units import Unit
 from ..names import derivative, rate_of, read
 from .attitudes import attitudes
-from .differential import Differential
 from .formulations.multipliers import multipliers
 from .kinematics import Kinematics
 

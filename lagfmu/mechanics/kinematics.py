@@ -21,6 +21,7 @@ from functools import cached_property
 import sympy as sp
 
 from ..model.alike import pattern
+from ..model.differential import Differential
 from ..model.elements import Expr
 
 TRIALS = 3
@@ -52,10 +53,11 @@ class Kinematics:
     def B(self) -> dict[tuple[int, int], Expr]:
         """The non-zeros of B (nq, nv)."""
         place = {s: i for i, s in enumerate(self.v)}
+        slope = [Differential({s: sp.S.One}) for s in self.v]
         found = {}
         for j, rate in enumerate(self.rates):
-            for s in sorted(rate.free_symbols & place.keys(), key=place.__getitem__):
-                found[j, place[s]] = rate.diff(s)
+            for i in sorted(place[s] for s in rate.free_symbols & place.keys()):
+                found[j, i] = slope[i](rate)
         return found
 
     @cached_property

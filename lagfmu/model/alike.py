@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import sympy as sp
 
@@ -32,6 +33,12 @@ class Pattern:
     def kind(self) -> object:
         """What those have in common that are alike."""
         return self.values, self.groups
+
+
+@lru_cache(maxsize=1024)
+def text_of(number: Expr) -> str:
+    """A number as text: few are many times."""
+    return str(number)
 
 
 def pattern(
@@ -63,7 +70,7 @@ def pattern(
                 is_data = e.vector and all(map(known, e.vector))
                 stack.extend((*e.args[:6], *e.args[9:]) if is_data else e.args)
                 if is_data:
-                    numbers = (str(x) for x in (*e.args[:2], *e.args[9:]) if x.is_number)
+                    numbers = (text_of(x) for x in (*e.args[:2], *e.args[9:]) if x.is_number)
                     spots.setdefault(e.args[2:9], []).append((f"{k:6}", str(e.func), *numbers))
             elif e.is_Symbol:
                 return None

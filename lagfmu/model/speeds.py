@@ -13,6 +13,7 @@ from collections.abc import Iterator
 import sympy as sp
 from sympy.core.function import AppliedUndef
 
+from .differential import Differential
 from .elements import Expr, ModelFields
 from .units import Unit, check_dimension, plain
 
@@ -88,12 +89,9 @@ def _of_rate(model: ModelFields, q: Expr, rate: Expr) -> Iterator[str]:
         yield f"{what}: {plain(rate)} holds a derivative, expected coordinates and speeds"
         return
     present = rate.atoms(AppliedUndef) & model.speeds.keys()
-    for w in present:
-        if sp.diff(rate, w).atoms(AppliedUndef) & present:
-            yield (
-                f"{what}: {plain(rate)} is not affine in the speeds, expected B(q, t) v + b(q, t)"
-            )
-            return
+    change = Differential({w: sp.Symbol(f"d {w}", real=True) for w in present})
+    if change(rate).atoms(AppliedUndef) & present:
+        yield f"{what}: {plain(rate)} is not affine in the speeds, expected B(q, t) v + b(q, t)"
 
 
 def check_rates(model: ModelFields, units: dict[Expr, Unit], problems: list[str]) -> None:

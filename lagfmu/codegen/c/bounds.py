@@ -13,10 +13,10 @@ from collections.abc import Mapping, Sequence
 import sympy as sp
 from sympy.core.relational import Relational
 
-from ...mechanics.differential import Differential
 from ...mechanics.equations import TIME, EquationsOfMotion
 from ...mechanics.jumps import Jumps
 from ...model.attitude import written_out
+from ...model.differential import Differential
 from ...model.elements import Expr
 from ...model.model import Constraint, Contact
 

@@ -13,8 +13,8 @@ from collections.abc import Mapping
 import sympy as sp
 
 from ..errors import DerivationError
-from ..model.attitude import ClosedFunction
-from ..model.elements import Expr
+from .attitude import ClosedFunction
+from .elements import Expr
 
 CONSTANT_PIECES = (
     sp.sign,
