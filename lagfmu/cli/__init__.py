@@ -1,5 +1,6 @@
 """The commands: options in, a call, tables and plots out."""
 
+import atexit
 import gc
 import os
 import signal
@@ -12,7 +13,8 @@ from ..verification.exit_codes import INTERRUPTED, TERMINATED
 
 def main() -> None:
     """The `lagfmu` command, also as `python -m lagfmu`."""
-    gc.set_threshold(100_000, 20, 20)  # SymPy makes many objects and few cycles
+    gc.set_threshold(100_000, 20, 20)  # SymPy makes many objects and few cycles, ...
+    atexit.register(gc.freeze)  # ... which need not be searched for where the process ends
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # of small matrices threads wait for a core
     signal.signal(signal.SIGTERM, _end)  # by the way on which temporary folders go
     if sys.argv[1:] == ["--version"]:
