@@ -60,6 +60,7 @@ def build_fmu(
     fmi: int = 2,
     clocks: bool = False,
     arrays: bool = False,
+    dae: bool = False,
 ) -> Path:
     """Build `model` as an FMU into the folder `out` (or to `out` itself if it ends in .fmu), and verify it.
 
@@ -75,14 +76,15 @@ def build_fmu(
 
     Without `sources` a native FMU carries no C files: it is smaller, and no tool can compile it again.
 
-    `fmi`: the version of FMI, 2 or 3, of a native FMU; 3 alone has `clocks` and `arrays`.
+    `fmi`: the version of FMI, 2 or 3, of a native FMU; 3 alone has `clocks`, `arrays` and `dae`
+    (experimental: an importer of model exchange may solve for the multipliers, FMI-LS-DAE).
 
     With `page` its documentation holds its live page (documentation/play.html), which needs ziglang.
 
     Raises ModelError, DerivationError, BuildError; SimulationError if it cannot be simulated;
     VerificationError with the statements that do not hold.  After the last two the file is kept.
     """
-    face = Face(fmi, clocks, arrays)
+    face = Face(fmi, clocks, arrays, dae)
     target = face.target(target)
     prepared = prepare(model, scene)
     built = package(

@@ -22,6 +22,7 @@ from functools import lru_cache
 VALUE = "value"  # of a coordinate, an input, a parameter or an output that the model names; or its derivative
 OWN = "own"  # in the variable table: the outputs among these
 MULTIPLIER, UNIQUE, RESIDUAL = "lambda", "unique", "residual"  # of a constraint
+RESIDUAL_RATE = "der(residual)"  # its first or second derivative: G v - nu, G vdot - gamma
 FORCE = "Q"  # on a coordinate: of all constraints, or the share of one
 CONTACT, DEPARTURE, CLOSING = "contact", "departure", "closing"
 STICKS, MARGIN, POWER = "sticks", "margin", "power"  # of a friction
@@ -43,7 +44,8 @@ KINETIC, POTENTIAL, TOTAL = "energy.kinetic", "energy.potential", "energy.total"
 DISSIPATED = "energy.dissipated"
 DISSIPATION = "der(energy.dissipated)"
 ENERGY, SOLVER = "energy", "solver"
-RATE = re.compile(r"der\((?!energy\.)([\w.]+)(?:,(\d+))?\)")
+RATE = re.compile(r"der\((?!energy\.|residual\.)([\w.]+)(?:,(\d+))?\)")
+OF_RESIDUAL = re.compile(r"der\(residual\.([\w.]+)(?:,(\d+))?\)")
 SENSITIVITY = "sensitivity"  # of another variable, by a parameter: sensitivity.lambda.rod.by.L
 SENSITIVITY_VALID = "sensitivity.valid"
 BY = ".by."
@@ -96,6 +98,8 @@ def name(quantity: str, constraint: str = "", coordinate: str = "", order: int =
     """The name of what a `Subject` with these fields is."""
     if quantity in (VALUE, OWN):
         return derivative(coordinate, order)
+    if quantity == RESIDUAL_RATE:
+        return derivative(name(RESIDUAL, constraint), order)
     head, _, tail = quantity.partition(".")
     if quantity == SENSITIVITY:
         return f"{head}.{_structured(coordinate)}{BY}{_structured(constraint)}"
@@ -140,6 +144,8 @@ def read(text: str) -> Subject:
     """What a variable of that name is of."""
     if found := RATE.fullmatch(text):
         return Subject(VALUE, "", found[1], int(found[2] or 1))
+    if found := OF_RESIDUAL.fullmatch(text):
+        return Subject(RESIDUAL_RATE, found[1], "", int(found[2] or 1))
     head, *rest = text.split(".")
     if text == DISSIPATION or (head in (ENERGY, SOLVER) and len(rest) == 1):
         return Subject(text)

@@ -21,7 +21,7 @@ FILES = {2: ("fmi2",), 3: ("fmi3", "dependencies.h")}  # how those of one versio
 class Face:
     """`fmi`: 2 or 3.  Of 3 with `clocks`, one ticks at the events of each contact and friction, and the
     importer must use event mode; with `arrays` there are further outputs, one for each unit of lambda, Q and
-    residuals.
+    residuals; with `dae` an importer of model exchange may solve for the multipliers (dae.py).
 
     Raises UsageError.
     """
@@ -29,12 +29,13 @@ class Face:
     fmi: int = 2
     clocks: bool = False
     arrays: bool = False
+    dae: bool = False
 
     def __post_init__(self) -> None:
         if self.fmi not in VERSIONS:
             expected = " or ".join(map(str, VERSIONS))
             raise UsageError(f"fmi = {self.fmi!r} is no version that is known, expected {expected}")
-        further = [n for n in ("clocks", "arrays") if getattr(self, n)]
+        further = [n for n in ("clocks", "arrays", "dae") if getattr(self, n)]
         if self.fmi == 2 and further:
             raise UsageError(
                 f"{' and '.join(further)}: FMI 2.0 has none: ask for FMI 3.0 (fmi = 3) too"

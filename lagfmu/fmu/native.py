@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 
+from .. import names
 from ..codegen.c.equations import model_source
 from ..codegen.c.interface import interface_source
 from ..codegen.c.optional import files_left_out, held, needs_tangents, optional_source
@@ -123,7 +124,8 @@ def sources_of(prepared: Prepared, listed: bool = True, face: Face = USUAL) -> S
         )
     everything = runtime_files()
     integrators = held(scene, form)
-    gone = files_left_out(scene, system, integrators, bool(table.measured))
+    dae = bool(table.those(names.RESIDUAL_RATE))
+    gone = files_left_out(scene, system, integrators, bool(table.measured), dae)
     generated = {
         "model.c": model_source(
             form, needs_tangents(scene, system), frozenset(table.varied)

@@ -34,6 +34,7 @@ from .archive import pack
 from .capabilities import offers_exchange
 from .closed_forms import pack_closed_forms
 from .compiler import HOST
+from .dae import MANIFEST, check_dae, manifest
 from .described import untold
 from .face import USUAL, Face
 from .target import NATIVE, target_of
@@ -89,6 +90,8 @@ def write(
     extra |= icon
     if (found := terminals(prepared, bool(icon))) is not None:
         extra[IN_FMU] = found
+    if face.dae:
+        extra[MANIFEST] = manifest(prepared)
     if live:
         extra[LIVE] = live.encode()
     if (picture := pictures.picture_of(prepared)) is not None:
@@ -203,7 +206,9 @@ def as_built(prepared: Prepared, target: str, face: Face = USUAL) -> Prepared:
     if not exchanged:
         table = table.without_local_derivatives()
     if face.fmi == 3:
-        model, more = prepared.model.name, (exchanged, face.clocks, face.arrays)
+        model, more = prepared.model.name, (exchanged, face.clocks, face.arrays, face.dae)
+        if face.dae:
+            check_dae(prepared)
         table = with_further(table, prepared.system, model, *more)
     return replace(prepared, table=table)
 

@@ -1,7 +1,8 @@
-"""What FMI 3.0 has variables for besides those of the table: time, event indicators, clocks, arrays.
+"""What FMI 3.0 has variables for besides those of the table: time, event indicators, residuals of a DAE,
+clocks, arrays.
 
 They come last, so that all others have the same value references in both versions, and the interface
-answers for them itself: the time, then indicators, clocks and arrays, numbered in this order.
+answers for them itself: in this order.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from .. import names
 from ..errors import ModelError
 from ..model.units import SECOND, Unit
 from ..names import Subject
-from ..numeric.system import System
+from ..numeric.system import NONHOLONOMIC, System
 from .table import collisions
 from .variables import Variable, VariableTable
 
@@ -28,9 +29,11 @@ def with_further(
     exchanged: bool,
     clocks: bool = False,
     arrays: bool = False,
+    dae: bool = False,
 ) -> VariableTable:
     """The table with `time`; for model exchange (`exchanged`) with the event indicators of the system; with
-    `clocks`, one for each contact and friction; with `arrays`, one for each unit of IN_ARRAYS.
+    `dae` the derivatives of all residuals, down to those that hold the multipliers; with `clocks`, one for
+    each contact and friction; with `arrays`, one for each unit of IN_ARRAYS.
 
     Raises ModelError, of `model`, if names collide.
     """
@@ -41,6 +44,8 @@ def with_further(
         known = [v.name for v in table.variables if v.causality == "input"]
         known += [*table.states, names.TIME]
         more += _indicators(contacts, len(system.switches), frictions, tuple(known))
+    if dae:
+        more += _residuals(table, system)
     if clocks:
         more += [_clock(c, f"each impact, closing and departure of {c}") for c in contacts]
         more += [_clock(c, f"each start of sliding and of sticking of {c}") for c in frictions]
@@ -74,6 +79,18 @@ def _indicators(
     for name, text in told:
         of = Subject(names.INDICATOR, name)
         yield _of_interface(of, f"event indicator of {text}", depends=known)
+
+
+def _residuals(table: VariableTable, system: System) -> Iterator[Variable]:
+    """G v - nu of what holds positions, then G vdot - gamma of all."""
+    for row in system.rows:
+        unit = table[names.name(names.RESIDUAL, row.name)].unit
+        orders = 1 if row.kind == NONHOLONOMIC else 2
+        for order in range(1, orders + 1):
+            unit = unit.per_second() if unit is not None else None
+            what = "acceleration" if order == orders else "velocity"
+            of = Subject(names.RESIDUAL_RATE, row.name, "", order)
+            yield _of_interface(of, f"{what} residual of constraint {row.name}", unit=unit)
 
 
 def _clock(of: str, text: str) -> Variable:

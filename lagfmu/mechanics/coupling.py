@@ -24,6 +24,11 @@ def constrained_together(eom: EquationsOfMotion) -> list[Group]:
     return [group for group in _tied(eom, []) if group[0]]
 
 
+def sharing_inertia(eom: EquationsOfMotion) -> list[frozenset[int]]:
+    """The speeds that the mass matrix alone ties together."""
+    return [frozenset(g) for g in connected_components((range(eom.nv), list(eom.M.todok())))]
+
+
 def _tied(eom: EquationsOfMotion, pairs: list[tuple[int, int]]) -> list[Group]:
     pairs = [*pairs, *((eom.nv + k, j) for k, j in eom.G.todok())]
     groups = connected_components((range(eom.nv + eom.m), pairs))

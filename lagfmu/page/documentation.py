@@ -49,7 +49,7 @@ GROUPS = (
     ("Extremes", "Of the continuous motion so far, between communication points too."),
     ("Friction", "Sticking, slip velocities, and what is left before a contact slips."),
     ("Solver", "Method, accuracy, and what was done."),
-    ("Of FMI 3.0 alone", "Time, event indicators, clocks and arrays."),
+    ("Of FMI 3.0 alone", "Time, event indicators, residuals, clocks and arrays."),
 )
 AFTER_FACTOR = re.compile(r"(?<=[\w})]) (?=\\(?:a?(?:sin|cos|tan)h?|log|exp|operatorname)\b)")
 TITLES = {  # by the kind of what a variable is of

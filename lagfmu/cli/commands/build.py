@@ -86,6 +86,14 @@ def build(
             "--arrays", help="FMI 3.0: lambda, Q and residuals of a unit as an array too."
         ),
     ] = False,
+    dae: Annotated[
+        bool,
+        typer.Option(
+            "--dae",
+            help="FMI 3.0, experimental: an importer of model exchange may solve for the multipliers "
+            "(FMI-LS-DAE).",
+        ),
+    ] = False,
     *,
     needs: Needs,
     add_output: AddOutput = None,
@@ -105,7 +113,7 @@ def build(
             raise UsageError(
                 "--platforms is for --target native: a python FMU has no binaries of ours"
             )
-        face = Face(fmi, clocks, arrays)
+        face = Face(fmi, clocks, arrays, dae)
         kind = face.target(NATIVE if platforms else target)
         folder = out / face.folder(kind)
         file = loaded(model, add_output, arguments)

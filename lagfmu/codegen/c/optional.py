@@ -27,6 +27,7 @@ DERIVATIVES = (
 )  # behind VARIATION
 BEHIND_BOTH = "extreme.c"
 MOTIONS = ("prescribed.c", "rates.c")  # behind PRESCRIBED of variables.c
+ALGEBRAIC = "algebraic.c"  # behind ALGEBRAIC of variables.c
 FRICTION = (  # behind FRICTION_EVENTS
     *("friction_events.c", "frictional_impact.c", "nonunique.c", "norms.c"),
     *("painleve.c", "sliding.c", "slip.c", "stick_slip.c"),
@@ -104,10 +105,17 @@ def needs_tangents(scene: Scene, system: System) -> bool:
 
 
 def files_left_out(
-    scene: Scene, system: System, found: tuple[str, ...], peaks: bool = False
+    scene: Scene,
+    system: System,
+    found: tuple[str, ...],
+    peaks: bool = False,
+    dae: bool = False,
 ) -> frozenset[str]:
-    """The runtime's files that the FMU does without; as `optional_source`."""
+    """The runtime's files that the FMU does without; as `optional_source`; `dae`: an importer may solve
+    for the multipliers."""
     gone = {f"{m}.c" for m in INTEGRATORS if m not in found}
+    if not dae:
+        gone.add(ALGEBRAIC)
     if not system.frictions:
         gone |= {*FRICTION}
     if not scene.error_bars:

@@ -13,7 +13,7 @@ from ...interface.rules import CALCULATED
 from ...interface.variables import Variable, VariableTable
 from ...mechanics.form import Form
 from ...model.scene import Scene
-from ...numeric.system import System
+from ...numeric.system import NONHOLONOMIC, System
 from .printer import string
 
 Place = tuple[str, int, int]  # where, index, contact
@@ -24,6 +24,7 @@ HEAD = """/* variables.c -- {name}: the variables of the FMU, in the order of mo
 #include <math.h>
 #include <stddef.h>
 
+#include "algebraic.h"
 #include "bars.h"
 #include "derivatives.h"
 #include "identity.h"
@@ -45,6 +46,7 @@ SHARED_VALUE const double DEFAULT_TOLERANCE = {tolerance};
 SHARED_VALUE const int DEFAULT_METHOD = {method};
 SHARED_VALUE const int EXCHANGE_LOST = {lost};
 SHARED_VALUE const Prescribed *const PRESCRIBED = {motions};
+SHARED_VALUE const Algebraic *const ALGEBRAIC = {multipliers};
 {bars}{derivatives}"""
 NO_BARS = "SHARED_VALUE const ErrorBars *const ERROR_BARS = NULL;\n"
 NO_COLUMNS = (
@@ -94,6 +96,7 @@ def variables_source(table: VariableTable, form: Form, scene: Scene, system: Sys
         method=scene.method.upper(),
         lost=int(names.DISSIPATED in table.states),
         motions="&MOTIONS" if system.prescribed else "NULL",
+        multipliers="&MULTIPLIERS_GIVEN" if table.those(names.RESIDUAL_RATE) else "NULL",
         bars=WITH_BARS if scene.error_bars else NO_BARS,
         derivatives=_columns([str(s) for s in eom.p], states, table.varied),
         peaked=f"(const Variable[]){{\n{''.join(measured)}}}" if measured else "NULL",
@@ -175,6 +178,10 @@ class Places:
             return "OUTPUT_UNIQUE", self.unique[c], NONE
         if what in OF_ROW:
             return OF_ROW[what], self.rows[c], NONE
+        if what == names.RESIDUAL_RATE:
+            k = self.rows[c]
+            last = rate == (1 if self.full.rows[k].kind == NONHOLONOMIC else 2)
+            return "RESIDUAL_ACCELERATION" if last else "RESIDUAL_RATE", k, NONE
         if what in OF_CONTACT:
             return OF_CONTACT[what], self.contacts[c], NONE
         if of.head in names.EVENTS:

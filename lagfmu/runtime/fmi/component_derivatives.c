@@ -2,16 +2,21 @@
 #include <math.h>
 #include <string.h>
 
+#include "algebraic.h"
 #include "component.h"
 #include "digits.h"
 
-/* Adds a known variable's change to the direction; 0 if it is neither time nor a state nor an input. */
-static int add_seed(Sensitivity *w, double *dt, const Variable *v, double change) {
+/* Adds a known variable's change to the direction; 0 if it is neither time nor a state nor an input, nor a multiplier
+ * that is given. */
+static int add_seed(Instance *x, double *dt, const Variable *v, double change) {
     const int nq = MODEL_SYSTEM->nq;
+    Sensitivity *w = &x->solver.sensitivity;
     if (v->place == AT_TIME)
         *dt += change;
     else if (v->place == AT_INPUT)
         w->du[v->index] += change;
+    else if (v->place == AT_LAMBDA && x->imposed)
+        w->dgiven[v->index] += change;
     else if (v->role == ROLE_START && v->state < nq)
         w->dq[v->state] += change;
     else if (v->role == ROLE_START)
@@ -27,6 +32,7 @@ static Direction no_direction(Sensitivity *w) {
     memset(w->dq, 0, (size_t)s->nq * sizeof *w->dq);
     memset(w->dv, 0, (size_t)s->nv * sizeof *w->dv);
     memset(w->du, 0, (size_t)s->inputs * sizeof *w->du);
+    memset(w->dgiven, 0, (size_t)s->m * sizeof *w->dgiven);
     return (Direction){0, w->dq, w->dv, w->du, w->dp};
 }
 
@@ -35,9 +41,10 @@ static int take_seed(Component *c, const Call *call, const Group *group, unsigne
     Why text;
     const Variable *v = component_find(c, call, known, group);
     if (v == NULL) return CALL_ERROR;
-    if (isfinite(change) && add_seed(&c->instance.solver.sensitivity, &d->dt, v, change)) return CALL_OK;
-    (void)fail(&text, "%s: a change of '%s' by %s, expected a finite change of a continuous state or an input",
-               call->name, v->name, digits(change).text);
+    if (isfinite(change) && add_seed(&c->instance, &d->dt, v, change)) return CALL_OK;
+    (void)fail(&text, "%s: a change of '%s' by %s, expected a finite change of a continuous state or an input%s",
+               call->name, v->name, digits(change).text,
+               ALGEBRAIC != NULL ? ", or of a multiplier once one has been set" : "");
     return component_refuse(c, text.text);
 }
 

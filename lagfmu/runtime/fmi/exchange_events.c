@@ -24,7 +24,7 @@ static const double DRIFT_LIMIT = 1e-3; /* residual, relative to a constraint's 
 /* Which rows stand for all from here on. */
 static Status choose_rows(Instance *x) {
     Solver *s = &x->solver;
-    if (s->system->m < 2) return OK;
+    if (s->system->m < 2 || x->imposed) return OK;
     segment_begin(s);
     x->evaluated = 0;
     if (segment_motion_near(s, segment_instant(s, s->state.now.t), s->state.q, s->state.v) != OK) return FAILED;
@@ -98,7 +98,7 @@ static Status judge_step(Instance *x, int *event) {
     int any; /* contacts that should have opened or closed, whatever the importer has seen of it */
     *event = s->system->switches > 0 &&
              OPTIONAL.switches->stale(s, segment_instant(s, s->state.now.t), s->state.q);
-    if (s->system->m == 0) return OK;
+    if (s->system->m == 0 || x->imposed) return OK;
     if (drift(x, &worst) != OK) return FAILED;
     if (s->state.now.dependent && are_close(&s->stepped.linear) && choose_rows(x) != OK) return FAILED;
     if (find_happened(x, &any) != OK) return FAILED;
@@ -150,7 +150,7 @@ static Status project_state(Solver *s) {
 /* The state back onto the rows that act. */
 static Status project(Instance *x) {
     x->observed = x->evaluated = 0;
-    return x->solver.system->m == 0 ? OK : project_state(&x->solver);
+    return x->solver.system->m == 0 || x->imposed ? OK : project_state(&x->solver);
 }
 
 /* The state has been on the rows: what sticks slips where a motion has been moved away from it. */

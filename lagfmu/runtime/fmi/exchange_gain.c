@@ -113,7 +113,7 @@ Status exchange_find_gain(Instance *x) {
     double *size = s->work_events;
     const Tried tried = {s, size, size + nq + nv, size + 2 * (nq + nv)};
     x->gain = 0;
-    if (s->system->m == 0) return OK;
+    if (s->system->m == 0 || x->imposed) return OK;
     segment_begin(s);
     x->evaluated = 0;
     if (move(s, tried.rate) != OK) return FAILED;

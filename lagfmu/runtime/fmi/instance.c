@@ -4,6 +4,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "algebraic.h"
 #include "indicators.h"
 
 static void *after(Arena *arena, char **base, size_t size) {
@@ -31,6 +32,7 @@ void instance_layout(Instance *x, Arena *arena) {
         x->v0 = arena_doubles(&saved, system->nv);
         x->expected = arena_doubles(&saved, system->inputs);
         x->set = arena_ints(&saved, system->inputs);
+        x->multiplier = arena_doubles(&saved, ALGEBRAIC != NULL ? system->m : 0);
         x->past = arena_take(&saved, (size_t)system->estimated_count, sizeof *x->past);
         x->priority = arena_take(&scratch, (size_t)system_states(system), sizeof *x->priority);
         x->begin = arena_doubles(&scratch, system_states(system));
@@ -74,6 +76,8 @@ void instance_reset(Instance *x) {
     x->given.method = (MethodName)DEFAULT_METHOD;
     x->solver.on_demand = 1;
     x->started = x->running = x->warned = x->moved = x->ticking = x->observed = x->evaluated = x->followed = 0;
+    x->imposed = 0;
+    if (ALGEBRAIC != NULL) ALGEBRAIC->apply(x);
     memset(x->shared, 0, (size_t)x->solver.system->frictions * sizeof *x->shared);
     for (int k = 0; k < VARIABLE_COUNT; k++)
         if (VARIABLES[k].type == TYPE_REAL &&

@@ -46,6 +46,8 @@ typedef struct Instance {
     Past *past;             /* (estimated_count of the system) */
     double gain;            /* [1/s] of model exchange's stabilization; < 0: not known yet */
     int ticking;            /* 1: an event of this instant has been met, and not yet what follows from it */
+    int imposed;            /* 1: an importer solves for the multipliers (algebraic.h), and has set them to ... */
+    double *multiplier;     /* (m) these */
     int moved;              /* 1: in model exchange, an event has changed the states since this was told */
     int warned;             /* 1: a jump of a prescribed motion has been told; 2 << i: lookup i outside */
     double *places;         /* (lookup_count) scratch */

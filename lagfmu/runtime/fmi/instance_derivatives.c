@@ -72,6 +72,8 @@ Status instance_change(const Instance *x, const Variable *v, Direction d, double
         case AT_RESIDUAL:
             *change = sensitivity_residual(w, b, v->index, x->seen.v, dv);
             break;
+        case AT_RESIDUAL_RATE: *change = sensitivity_slip(w, b, v->index, x->seen.v, dv); break;
+        case AT_RESIDUAL_ACCELERATION: *change = sensitivity_acceleration(w, b, v->index); break;
         case AT_FORCE: *change = w->dforce[v->index]; break;
         case AT_SHARE: *change = sensitivity_share(w, b, v->index); break;
         case AT_KINETIC: *change = w->denergy[0]; break;
@@ -122,6 +124,7 @@ static void weigh_variable(Instance *x, const Variable *v, double weight, double
             for (int e = 0; e < b->system->entries; e++)
                 if (b->system->entry_column[e] == i) w->on_lambda[b->system->entry_row[e]] += weight * b->G[e];
             break;
+        case AT_RESIDUAL_ACCELERATION: mechanism_push(b, i, weight, w->on_vdot); break;
         case AT_OUTPUT: own[i] += weight; break;
         default: break; /* neither is in it */
     }

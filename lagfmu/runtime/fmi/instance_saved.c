@@ -3,12 +3,14 @@
 
 #include <string.h>
 
+#include "algebraic.h"
+
 /* The numbers of a saved state; its arrays follow. */
 typedef struct {
     Numbers now;
     Settings settings, given;
     double since, start_time, stop_time, tolerance, gain;
-    int exchange, phase, started, running, warned, moved, ticking;
+    int exchange, phase, started, running, warned, moved, ticking, imposed;
 } Record;
 
 static size_t record_head(void) { return (sizeof(Record) + 15) / 16 * 16; }
@@ -34,6 +36,8 @@ void instance_restore(Instance *x, const char *record) {
     x->moved = head.moved;
     x->ticking = head.ticking;
     x->gain = head.gain;
+    x->imposed = head.imposed;
+    if (ALGEBRAIC != NULL) ALGEBRAIC->apply(x);
     x->warned = head.warned;
     x->observed = x->evaluated = x->followed = 0;
     if (ERROR_BARS != NULL) ERROR_BARS->restore(x);
@@ -65,6 +69,7 @@ void instance_save(Instance *x, char *record) {
     head.warned = x->warned;
     head.moved = x->moved;
     head.ticking = x->ticking;
+    head.imposed = x->imposed;
     head.gain = x->gain;
     if (ERROR_BARS != NULL) ERROR_BARS->save(x);
     memcpy(record, &head, sizeof head);

@@ -1,6 +1,7 @@
 /* instance_set.c -- what an importer sets: start values, parameters, solver settings, inputs. */
 #include "instance.h"
 
+#include "algebraic.h"
 #include "prescribed.h"
 
 int instance_was_set(const Instance *x, const Variable *v, double *value) {
@@ -64,6 +65,10 @@ static void set_input(Instance *x, int k, double value) {
 
 void instance_set(Instance *x, const Variable *v, double value) {
     instance_unfollow(x);
+    if (v->place == AT_LAMBDA) { /* of an importer that solves for it */
+        ALGEBRAIC->set(x, v, value);
+        return;
+    }
     const int nq = x->solver.system->nq;
     if (v->place == AT_INPUT) {
         set_input(x, v->index, value);

@@ -12,6 +12,7 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "algebraic.h"
 #include "digits.h"
 #include "indicators.h"
 #include "optional.h"
@@ -29,7 +30,7 @@ enum { FLAG, COUNT, TALLY, SIZE, LIMIT, FINITE };
 enum {
     ONE, COORDINATES, SPEEDS, STATES, ROWS, CONTACTS, CONTACTS_COORDINATES, CONTACTS_SPEEDS, FRICTIONS,
     FRICTIONS_COORDINATES, FRICTIONS_SPEEDS, INPUTS, SWITCH_STATES, PARAMETERS, PEAKS_KEPT, WATCHED, DENSE,
-    STEPPED, VARIATIONS, VARIED
+    STEPPED, VARIATIONS, VARIED, GIVEN_ROWS
 };
 
 typedef struct {
@@ -121,6 +122,8 @@ static const Saved OF_INSTANCE[] = {
     INSTANCE("type", exchange, FLAG, ONE),
     INSTANCE("whether an event has moved the states", moved, FLAG, ONE),
     INSTANCE("whether clocks tick", ticking, FLAG, ONE),
+    INSTANCE("multipliers", imposed, FLAG, ONE),
+    INSTANCE("multipliers", multiplier, FINITE, GIVEN_ROWS),
     INSTANCE("stabilization", gain, FINITE, ONE),
     INSTANCE("mode", started, FLAG, ONE),
     INSTANCE("mode", running, FLAG, ONE),
@@ -178,7 +181,8 @@ static Status each(Instance *x, const Solver *s, const void *base, const Saved *
                         [DENSE] = now == NULL ? 0 : now->dense_arrays * solver_width(s),
                         [STEPPED] = solver_width(s),
                         [VARIATIONS] = s->columns * column_size(system),
-                        [VARIED] = s->columns > 0};
+                        [VARIED] = s->columns > 0,
+                        [GIVEN_ROWS] = ALGEBRAIC != NULL ? system->m : 0};
     for (const Saved *row = list; row < list + rows; row++) {
         const void *where = (const char *)base + row->at;
         if (row->many != ONE) memcpy(&where, where, sizeof where);
@@ -197,6 +201,7 @@ static Status each(Instance *x, const Solver *s, const void *base, const Saved *
 static Status together(Instance *x) {
     const Solver *s = &x->solver;
     if (x->running && !x->started) return restored_none(x, "mode", x->running);
+    if (x->imposed && !(ALGEBRAIC != NULL && x->exchange && x->running)) return restored_none(x, "multipliers", 1);
     if (x->warned < 0) return restored_none(x, "mode", x->warned); /* bits of what has been told */
     if (!offered(x->given.method)) return restored_none(x, "given method", (double)x->given.method);
     if (x->started && !offered(s->settings.method))

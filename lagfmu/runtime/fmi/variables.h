@@ -21,6 +21,7 @@ typedef enum {
     AT_QDOT,                   /* the rate of a full coordinate that is none of the speeds */
     AT_S, AT_SDOT, AT_SDDOT,   /* stepped coordinates of an embedding that are not full ones */
     AT_LAMBDA, AT_UNIQUE, AT_RESIDUAL, /* row index */
+    AT_RESIDUAL_RATE, AT_RESIDUAL_ACCELERATION, /* the same: G v - nu, G vdot - gamma (algebraic.h) */
     AT_FORCE,          /* Q[index] */
     AT_SHARE,          /* entry index of G */
     AT_KINETIC, AT_POTENTIAL, AT_TOTAL,

@@ -15,6 +15,7 @@ void mechanism_layout(Mechanism *b, Arena *arena, const System *s, Why *why,
     b->why = why;
     b->dependent = b->stage = 0;
     b->basis = NULL;
+    b->given = NULL;
     b->M = arena_doubles(arena, s->masses);
     b->F = arena_doubles(arena, s->nv);
     b->G = arena_doubles(arena, s->entries);
@@ -29,6 +30,8 @@ void mechanism_layout(Mechanism *b, Arena *arena, const System *s, Why *why,
     b->trial = arena_doubles(arena, s->nq);
     b->fixed = arena_ints(arena, s->m);
     b->pulls = arena_ints(arena, s->m);
+    b->none = arena_ints(arena, s->m);
+    for (int k = 0; k < s->m && b->none != NULL; k++) b->none[k] = 0;
     if (s->kinematics != NULL) KINEMATICS->layout(b, arena);
     linear_layout(&b->linear, arena, s, why);
     b->sliding = s->frictions > 0 ? sliding : NULL;
@@ -85,10 +88,25 @@ Status mechanism_residual(Mechanism *b, Instant at, const double *q, double *f) 
                 t.text, s->rows[k].name);
 }
 
+/* M vdot = F + G^T lambda with the multipliers that are given. */
+static Status motion_given(Mechanism *b) {
+    const System *s = b->system;
+    double *force = b->dq;
+    memcpy(force, b->F, (size_t)s->nv * sizeof *force);
+    for (int k = 0; k < s->m; k++) mechanism_push(b, k, b->given[k], force);
+    if (linear_factor(&b->linear, b->M, b->G, b->none) != OK ||
+        linear_solve(&b->linear, force, b->gamma, b->vdot, b->lambda) != OK)
+        return FAILED;
+    memcpy(b->lambda, b->given, (size_t)s->m * sizeof *b->lambda);
+    return OK;
+}
+
 Status mechanism_motion(Mechanism *b, Instant at, const double *q, const double *v,
                         const int *active) {
     evaluate_functions(b, at, q, v);
-    if (b->sliding != NULL) {
+    if (b->given != NULL) {
+        if (motion_given(b) == OK) return OK;
+    } else if (b->sliding != NULL) {
         if (b->sliding->motion(b, at, q, v, active) == OK) return OK;
     } else if (linear_factor(&b->linear, b->M, b->G, active) == OK &&
                linear_solve(&b->linear, b->F, b->gamma, b->vdot, b->lambda) == OK) {

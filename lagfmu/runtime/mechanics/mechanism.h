@@ -49,6 +49,8 @@ struct Mechanism {
     int *pulls;                     /* (m) those of the basis among them */
     int dependent;                  /* 1: rows that act depend on each other, on the constraints */
     const int *basis;               /* (m) those that stood for all at the latest state on them; NULL: not known */
+    const double *given;            /* (m) multipliers that somebody else solves for; NULL: motion() does */
+    int *none;                      /* (m) no row acts */
     int stage;                      /* 1: of motion(), the accelerations alone are asked for */
     Why *why;
     const Sliding *sliding;     /* NULL without frictions */
@@ -133,7 +135,8 @@ SHARED double mechanism_square(const Mechanism *b, const double *x);
 /* f (m).  FAILED if one is not finite. */
 SHARED Status mechanism_residual(Mechanism *b, Instant at, const double *q, double *f);
 
-/* evaluate, factor, solve: b->vdot (nv) and b->lambda (m), 0 where a row does not act. */
+/* evaluate, factor, solve: b->vdot (nv) and b->lambda (m), 0 where a row does not act.  Where multipliers are given
+ * M vdot = F + G^T lambda alone, whatever rows act. */
 SHARED Status mechanism_motion(Mechanism *b, Instant at, const double *q, const double *v,
                                const int *active);
 

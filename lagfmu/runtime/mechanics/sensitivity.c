@@ -7,6 +7,7 @@
  *   M dvdot = b + G^T dlambda ,  G dvdot = c ,
  *   b = dF + dG^T lambda - dM vdot ,  c = dgamma - dG vdot ,  dq' = B dv + dB v + db
  *
+ * (where the multipliers are given, M dvdot = b + G^T dlambda with their change alone),
  * a further solve with the factors that gave vdot and lambda (implicit function theorem; Hairer &
  * Wanner II, sect. VII.1, for index-1 equations).  Weights a of dvdot and l of dlambda are weights x of b and mu of c,
  *
@@ -37,6 +38,7 @@ void sensitivity_layout(Sensitivity *w, Arena *arena, const System *s) {
     w->dp = arena_doubles(arena, s->parameters);
     for (int k = 0; k < s->parameters && w->dp != NULL; k++) w->dp[k] = 0;
     w->dforce = arena_doubles(arena, s->nv);
+    w->dgiven = arena_doubles(arena, s->m);
     w->known = arena_doubles(arena, s->m);
     w->on_vdot = arena_doubles(arena, s->nv);
     w->on_lambda = arena_doubles(arena, s->m);
@@ -59,6 +61,10 @@ static void right_sides(Sensitivity *w, const Mechanism *b) {
         const int k = s->entry_row[e], j = s->entry_column[e];
         w->b[j] += w->dG[e] * b->lambda[k];
         w->c[k] -= w->dG[e] * b->vdot[j];
+    }
+    for (int k = 0; k < s->m && b->given != NULL; k++) {
+        mechanism_push(b, k, w->dgiven[k], w->b);
+        w->dlambda[k] = w->dgiven[k];
     }
 }
 
@@ -87,6 +93,7 @@ Status sensitivity_along(Sensitivity *w, Mechanism *b, Instant at, const double 
                          const double *v, Direction d) {
     const System *s = b->system;
     if (sensitivity_sides(w, b, at, q, v, d) != OK) return FAILED;
+    if (b->given != NULL) return linear_solve(&b->linear, w->b, w->c, w->dvdot, NULL);
     if (linear_solve(&b->linear, w->b, w->c, w->dvdot, w->dlambda) == OK) return OK;
     for (int k = 0; k < s->m; k++)
         if (!b->linear.unique[k])
@@ -115,16 +122,19 @@ void sensitivity_of_values(Sensitivity *w, const System *s, Instant at, const do
                w->dgamma, w->df, w->denergy);
 }
 
-double sensitivity_residual(const Sensitivity *w, const Mechanism *b, int k, const double *v,
-                            const double *dv) {
+double sensitivity_slip(const Sensitivity *w, const Mechanism *b, int k, const double *v, const double *dv) {
     const System *s = b->system;
-    if (s->rows[k].kind != NONHOLONOMIC) return w->df[k];
     double change = -w->dnu[k];
     for (int e = s->row_start[k]; e < s->row_start[k + 1]; e++) {
         const int j = s->entry_column[e];
         change += w->dG[e] * v[j] + b->G[e] * dv[j];
     }
     return change;
+}
+
+double sensitivity_residual(const Sensitivity *w, const Mechanism *b, int k, const double *v,
+                            const double *dv) {
+    return b->system->rows[k].kind != NONHOLONOMIC ? w->df[k] : sensitivity_slip(w, b, k, v, dv);
 }
 
 Status sensitivity_jacobian(Sensitivity *w, Mechanism *b, Instant at, const int *active,

@@ -22,6 +22,7 @@ typedef struct {
     double *dp;              /* (parameters) 0, but where a run's derivatives are taken */
     double *dforce;          /* (nv) change of Q */
     double *down, *dother;   /* (output_count) changes of these */
+    double *dgiven;          /* (m) change of multipliers that are given; read where they are */
     double *known;           /* (m) dlambda where it is unique, no numbers elsewhere */
     double *on_vdot, *on_lambda;     /* (nv), (m) weights, and ... */
     double *on_b, *on_c;             /* ... those of b and c that follow from them */
@@ -39,7 +40,7 @@ SHARED Status sensitivity_sides(Sensitivity *w, Mechanism *b, Instant at, const 
                                 Direction d);
 
 /* The transposed solve with the factors of that motion:  on_vdot . dvdot + on_lambda . dlambda = on_b . b + on_c . c
- * for every direction.  What dvdot and dlambda are after it is 0. */
+ * for every direction.  What dvdot and dlambda are after it is 0; multipliers that are given are in b. */
 SHARED Status sensitivity_adjoint(Sensitivity *w, Mechanism *b);
 
 /* Changes of M, F, G, nu, gamma, f and the energies along a direction; nothing is solved. */
@@ -50,6 +51,12 @@ SHARED void sensitivity_of_values(Sensitivity *w, const System *s, Instant at, c
 static inline double sensitivity_share(const Sensitivity *w, const Mechanism *b, int e) {
     const int k = b->system->entry_row[e];
     return w->dG[e] * b->lambda[k] + b->G[e] * w->dlambda[k];
+}
+
+/* The change of row k's G v - nu, and of its G vdot - gamma, by the dvdot that was found. */
+SHARED double sensitivity_slip(const Sensitivity *w, const Mechanism *b, int k, const double *v, const double *dv);
+static inline double sensitivity_acceleration(const Sensitivity *w, const Mechanism *b, int k) {
+    return mechanism_row(b, k, w->dvdot) - w->c[k];
 }
 
 /* The change of row k's residual: df, or of G v - nu for a nonholonomic row. */
