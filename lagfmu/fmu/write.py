@@ -136,24 +136,24 @@ def as_fmu(
         chosen = scene if isinstance(scene, Scene) else file.called(scene)[0]
     kind = target_of()
     with tempfile.TemporaryDirectory(prefix="lagfmu_") as folder:
-        prepared = _prepared(model, chosen, sensitivities if kind == NATIVE else ())
+        prepared = prepare(model, chosen)
         if kind == NATIVE:
-            prepared = with_peaks(prepared, peaks)
+            prepared = with_sensitivities(with_peaks(prepared, peaks), sensitivities)
         yield write(prepared, folder, closed_forms, kind)
 
 
-def _prepared(model: Model, scene: Scene, sensitivities: Sequence[str]) -> Prepared:
+def with_sensitivities(prepared: Prepared, wanted: Sequence[str]) -> Prepared:
     """With derivatives where the model and the scene have them; else it is said why without."""
-    if sensitivities:
-        try:
-            return prepare(
-                model, replace(scene, sensitivities=(*scene.sensitivities, *sensitivities))
-            )
-        except RequestError:
-            pass  # who asked for names that there are not hears of it from the one who reads them
-        except (ModelError, DerivationError) as error:
-            LOG.info("%s is built without derivatives: %s", scene.name, error)
-    return prepare(model, scene)
+    if not wanted:
+        return prepared
+    try:
+        asked = replace(prepared.asked, sensitivities=(*prepared.asked.sensitivities, *wanted))
+        return prepare(prepared.model, asked, prepared.derived)
+    except RequestError:
+        pass  # who asked for names that there are not hears of it from the one who reads them
+    except (ModelError, DerivationError) as error:
+        LOG.info("%s is built without derivatives: %s", prepared.scene.name, error)
+    return prepared
 
 
 def with_peaks(prepared: Prepared, wanted: Sequence[str]) -> Prepared:

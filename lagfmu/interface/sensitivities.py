@@ -8,7 +8,7 @@ from .. import names
 from ..model.selection import listed, select
 from .variables import Variable
 
-NOT_DIFFERENTIATED = (names.RESIDUAL, names.ERROR, names.STEPS, *names.COUNTS, *names.PEAKS)
+NOT_DIFFERENTIATED = (names.RESIDUAL, names.ERROR, names.STEPS, *names.COUNTS)
 
 
 def differentiated(
@@ -27,12 +27,13 @@ def differentiated(
         wanted = listed(outputs)
         problems += [
             f"sensitivities: {name!r} is not differentiated: expected an output of the motion or of its "
-            "events, but no residual, count or extreme, and no energy that frictions dissipate"
+            "events, or an extreme of one, but no residual or count, and no energy that frictions dissipate"
             for name in wanted
             if name in others
         ]
         known = [name for name in wanted if name not in others]
         rows = select(known, list(of), "sensitivities: the output", problems)
+        rows = tuple(row for row in rows if _is_meant(row, known))
         columns = select(
             listed(numbers), list(by), "sensitivities: the parameter or start value", problems
         )
@@ -46,8 +47,17 @@ def named(asked: Sequence[str]) -> set[str]:
     return {number for number in found if not {"*", "?"} & set(number)}
 
 
+def _is_meant(output: str, asked: Sequence[str]) -> bool:
+    """Not the time of an extreme by a pattern of everything: at a start from rest it has no derivative."""
+    if not names.read(output).quantity.endswith("_time"):
+        return True
+    return bool(select([text for text in asked if text.startswith(names.PEAK)], [output], "", []))
+
+
 def _is_differentiable(v: Variable) -> bool:
-    """What is reported of the motion, and of its events."""
+    """What is reported of the motion, and of its events; and their extremes."""
+    if v.measured is not None:
+        return _is_differentiable(v.measured)
     if v.of.quantity == names.DISSIPATED and v.variability == "continuous":
         return False  # the work of frictions is summed up, not integrated
     calculated = v.role in ("output", "start") and v.kind == "Real"

@@ -52,8 +52,8 @@ def _table(form: Form, scene: Scene) -> VariableTable:
     if scene.error_bars:
         variables += outputs.error_bars(variables)
     measurable = VariableTable(tuple(variables), (), ()).measurable
-    variables += outputs.sensitivities(differentiated(variables, scene.sensitivities, []))
     variables += outputs.peaks(measurable)
+    variables += outputs.sensitivities(differentiated(variables, scene.sensitivities, []))
     shown = eom.model.display_units
     variables = [replace(v, display=_displayed(v, shown.get(v.of.coordinate))) for v in variables]
     states = outputs.behind.states

@@ -127,7 +127,8 @@ def _asked(form: Form, scene: Scene, problems: list[str]) -> Asked:
     found |= {names.barred(name) for name in found}  # a bar is of an output, ...
     found |= {names.bar(name) for name in found}  # ... and an output has its own
     found |= {name for name in known if names.read(name).head == names.SENSITIVITY}
+    found |= {names.varied(name) for name in found}  # a derivative stands beside what it is of
     outputs = tuple(name for name in known if name in found)
-    behind = [names.measured(name) or names.varied(name) for name in outputs]
+    behind = [names.measured(name) for name in outputs]
     read = tuple(dict.fromkeys((*outputs, *(name for name in behind if name))))
     return Asked(scene, form, whole, outputs, read)

@@ -22,6 +22,7 @@ DERIVATIVES = (
     "beside.c",
     "derivatives.c",
     "kept.c",
+    "peak_changes.c",
     "saltation.c",
     "variation.c",
 )  # behind VARIATION

@@ -10,6 +10,7 @@
 
 #include "instance.h"
 #include "optional.h"
+#include "peaks.h"
 #include "saltation.h"
 
 struct Derived {
@@ -19,6 +20,8 @@ struct Derived {
     Observed seen;   /* a little beside it, and the state there is none */
     double *held;    /* (states) */
     double *q, *v;   /* (nq), (nv) of the full system: of an event */
+    double *way;     /* (states) the rate of the state, with */
+    double *peaked;  /* (PEAK_COUNT) values a little beside it */
 };
 
 static int is_derivative(int k) { return VARIABLES[k].place == AT_SENSITIVITY; }
@@ -36,6 +39,8 @@ static void layout_derivatives(Instance *x, Arena *scratch) {
     const System *full = MODEL_SYSTEM->full;
     d->q = arena_doubles(scratch, full != NULL ? full->nq : 0);
     d->v = arena_doubles(scratch, full != NULL ? full->nv : 0);
+    d->way = arena_doubles(scratch, system_states(MODEL_SYSTEM));
+    d->peaked = arena_doubles(scratch, PEAK_COUNT);
 }
 
 /* ------------------------------------------------------------------ the run */
@@ -80,10 +85,15 @@ static double at_event(Instance *x, const Variable *of, const double *column) {
 }
 
 /* What a state remembers; 0 if it is something else. */
-static int remembered(Instance *x, const Variable *of, const double *column, double *value) {
+static int remembered(Instance *x, const Variable *of, int c, double *value) {
     const System *system = x->solver.system;
+    const double *column = column_at(&x->solver, c);
     if (of->place == AT_IMPULSE || of->place == AT_LOST) {
         *value = column[of->place == AT_LOST ? column_of_loss(system) : column_of_impulse(system, of->index)];
+        return 1;
+    }
+    if (is_of_peak(of->place)) {
+        *value = peak_change(&x->solver, c, of->index)[of->place - AT_PEAK_MAX];
         return 1;
     }
     if (!is_of_event(of->place)) return 0;
@@ -97,67 +107,139 @@ static int remembered(Instance *x, const Variable *of, const double *column, dou
     return 1;
 }
 
-static Status by_tangents(Instance *x, int c, const double *column) {
+/* Everything by the tangents, along a column or, -1, the motion. */
+static Status differentiate_along(Instance *x, int c, Direction *d) {
     Solver *s = &x->solver;
+    Sensitivity *w = &s->sensitivity;
+    if (c < 0) return instance_rates(x, d);
+    const double *column = column_at(s, c);
+    const int parameter = s->column[c].parameter;
+    *d = (Direction){0, column, column + s->system->nq, w->du, w->dp};
+    memset(w->du, 0, (size_t)s->system->inputs * sizeof *w->du);
+    if (parameter >= 0) w->dp[parameter] = 1;
+    const Status status = instance_differentiate(x, *d);
+    if (parameter >= 0) w->dp[parameter] = 0;
+    return status;
+}
+
+static Status by_tangents(Instance *x, int c) {
     struct Derived *all = x->derived;
-    const Direction d = {0, column, column + s->system->nq, s->sensitivity.du, s->sensitivity.dp};
-    memset(s->sensitivity.du, 0, (size_t)s->system->inputs * sizeof *s->sensitivity.du);
-    if (instance_differentiate(x, d) != OK) return FAILED;
+    Direction d;
+    if (differentiate_along(x, c, &d) != OK) return FAILED;
     for (int k = all->first; k < all->end; k++) {
         const Variable *of = &VARIABLES[VARIABLES[k].index];
         double *value = &all->value[k - all->first];
-        if (VARIABLES[k].contact != c || remembered(x, of, column, value)) continue;
+        if (VARIABLES[k].contact != c || remembered(x, of, c, value)) continue;
         if (instance_change(x, of, d, value) != OK) *value = 0; /* of a multiplier that is not unique */
     }
     return OK;
 }
 
-/* Adds weight w at y + part S, p + part. */
-static Status add_values(Instance *x, int c, const double *column, double part, double weight) {
-    Solver *s = &x->solver;
-    struct Derived *all = x->derived;
-    const int nq = s->system->nq, parameter = s->column[c].parameter;
-    const double held = parameter < 0 ? 0 : s->p[parameter];
-    for (int j = 0; j < nq; j++) s->state.q[j] = all->held[j] + part * column[j];
-    for (int i = 0; i < s->system->nv; i++) s->state.v[i] = all->held[nq + i] + part * column[nq + i];
+/* The state a little beside all->held, observed in all->seen: y + part S, t + part dt, p + part; parameter -1: none. */
+static Status observe_beside(Solver *s, struct Derived *all, Way way, double part) {
+    const int nq = s->system->nq, parameter = way.parameter;
+    const double held = parameter < 0 ? 0 : s->p[parameter], t = s->state.now.t;
+    for (int j = 0; j < nq; j++) s->state.q[j] = all->held[j] + part * way.dy[j];
+    for (int i = 0; i < s->system->nv; i++) s->state.v[i] = all->held[nq + i] + part * way.dy[nq + i];
     if (parameter >= 0) s->p[parameter] = held + part;
-    Status status = solver_observe(s, &all->seen);
-    for (int k = all->first; k < all->end && status == OK; k++) {
-        const Variable *of = &VARIABLES[VARIABLES[k].index];
-        double value = 0, *sum = &all->value[k - all->first];
-        if (VARIABLES[k].contact != c || remembered(x, of, column, &value)) continue;
-        status = instance_value(s, &all->seen, of, &value);
-        *sum += weight * value;
-    }
+    s->state.now.t = t + part * way.dt;
+    const Status status = solver_observe(s, &all->seen);
     if (parameter >= 0) s->p[parameter] = held;
+    s->state.now.t = t;
     return status;
 }
 
-static Status by_differences(Instance *x, int c, const double *column) {
+/* Adds weight w at such a state. */
+static Status add_values(Instance *x, int c, Way way, double part, double weight) {
+    Solver *s = &x->solver;
+    struct Derived *all = x->derived;
+    Status status = observe_beside(s, all, way, part);
+    for (int k = all->first; k < all->end && status == OK; k++) {
+        const Variable *of = &VARIABLES[VARIABLES[k].index];
+        double value = 0, *sum = &all->value[k - all->first];
+        if (VARIABLES[k].contact != c || remembered(x, of, c, &value)) continue;
+        status = instance_value(s, &all->seen, of, &value);
+        *sum += weight * value;
+    }
+    return status;
+}
+
+static Status by_differences(Instance *x, int c) {
     Solver *s = &x->solver;
     struct Derived *all = x->derived;
     state_gather(s->system, s->state.q, s->state.v, all->held);
-    const double step = saltation_step(s, (Way){0, all->held, column, s->column[c].parameter, NULL});
+    const Way way = {0, all->held, column_at(s, c), s->column[c].parameter, NULL};
+    const double step = saltation_step(s, way);
     Status status = OK;
     for (int k = all->first; k < all->end; k++)
-        if (VARIABLES[k].contact == c && !remembered(x, &VARIABLES[VARIABLES[k].index], column, &all->value[k - all->first]))
+        if (VARIABLES[k].contact == c && !remembered(x, &VARIABLES[VARIABLES[k].index], c, &all->value[k - all->first]))
             all->value[k - all->first] = 0;
     for (int r = 0; r < BESIDE_POINTS && status == OK; r++)
-        status = add_values(x, c, column, step * BESIDE_AT[r], BESIDE_WEIGHT[r] / step);
+        status = add_values(x, c, way, step * BESIDE_AT[r], BESIDE_WEIGHT[r] / step);
     state_scatter(s->system, all->held, s->state.q, s->state.v);
     return status;
 }
 
 static Status derive(Instance *x, int c) {
+    return x->solver.system->frictions > 0 ? by_differences(x, c) : by_tangents(x, c);
+}
+
+/* ------------------------------------------------------------------ extremes */
+
+/* Changes (PEAK_COUNT) of the quantities whose extremes are kept: by differences. */
+static Status peaked_by_differences(Instance *x, int c, double *changes) {
     Solver *s = &x->solver;
-    const double *column = column_at(s, c);
-    const int parameter = s->column[c].parameter;
-    if (s->system->frictions > 0) return by_differences(x, c, column);
-    if (parameter >= 0) s->sensitivity.dp[parameter] = 1;
-    const Status status = by_tangents(x, c, column);
-    if (parameter >= 0) s->sensitivity.dp[parameter] = 0;
+    struct Derived *all = x->derived;
+    state_gather(s->system, s->state.q, s->state.v, all->held);
+    if (c < 0 && saltation_flow(s, s->state.now.t, all->held, all->way) != OK) return FAILED;
+    const Way way = {c < 0, all->held, c < 0 ? all->way : column_at(s, c), c < 0 ? -1 : s->column[c].parameter, NULL};
+    const double step = saltation_step(s, way);
+    Status status = OK;
+    memset(changes, 0, (size_t)PEAK_COUNT * sizeof *changes);
+    for (int r = 0; r < BESIDE_POINTS && status == OK; r++) {
+        status = observe_beside(s, all, way, step * BESIDE_AT[r]);
+        if (status == OK) status = s->measure(s, &all->seen, all->peaked);
+        for (int k = 0; k < PEAK_COUNT; k++) changes[k] += BESIDE_WEIGHT[r] / step * all->peaked[k];
+    }
+    state_scatter(s->system, all->held, s->state.q, s->state.v);
     return status;
 }
+
+static Status change_of_peaked(Solver *s, int c, double *changes) {
+    Instance *x = s->caller;
+    Direction d;
+    if (s->system->frictions > 0) return peaked_by_differences(x, c, changes);
+    if (solver_observe(s, &x->seen) != OK) return FAILED;
+    x->observed = 1; /* of this state, until it has been differentiated */
+    const Status status = differentiate_along(x, c, &d);
+    for (int k = 0; k < PEAK_COUNT && status == OK; k++)
+        if (instance_change(x, &PEAKED[k], d, &changes[k]) != OK) changes[k] = 0;
+    x->observed = x->evaluated = 0;
+    return status;
+}
+
+static const char *name_of_asked(int c, int k, int part) {
+    for (int j = 0; j < VARIABLE_COUNT; j++) {
+        const Variable *of = is_derivative(j) && VARIABLES[j].contact == c ? &VARIABLES[VARIABLES[j].index] : NULL;
+        if (of != NULL && of->index == k && of->place == (Place)(AT_PEAK_MAX + part)) return of->name;
+    }
+    return NULL;
+}
+
+static int any_of_peaks(void) {
+    for (int j = 0; j < VARIABLE_COUNT; j++)
+        if (is_derivative(j) && is_of_peak(VARIABLES[VARIABLES[j].index].place)) return 1;
+    return 0;
+}
+
+static void prepare_peaks(Instance *x) {
+    x->solver.caller = x;
+    x->solver.peak_columns = any_of_peaks() ? COLUMN_COUNT : 0;
+    x->solver.measure_change = change_of_peaked;
+    x->solver.peak_asked = name_of_asked;
+}
+
+/* ------------------------------------------------------------------ */
 
 static Status get_derivative(Instance *x, const Variable *v, double *value) {
     struct Derived *all = x->derived;
@@ -176,4 +258,4 @@ static Status get_derivative(Instance *x, const Variable *v, double *value) {
     return OK;
 }
 
-SHARED_VALUE const Derivatives OF_RUN = {layout_derivatives, start_derivatives, forget, get_derivative, tell_of_end};
+SHARED_VALUE const Derivatives OF_RUN = {prepare_peaks, layout_derivatives, start_derivatives, forget, get_derivative, tell_of_end};

@@ -13,6 +13,8 @@ struct Instance;
 struct Variable;
 
 typedef struct {
+    /* Before any layout: are extremes differentiated? */
+    void (*prepare)(struct Instance *x);
     void (*layout)(struct Instance *x, Arena *scratch);
     /* Columns at the start that has been found. */
     Status (*start)(struct Instance *x);

@@ -25,6 +25,7 @@ void instance_layout(Instance *x, Arena *arena) {
     x->solver.measure = measure_peaked;
     x->solver.columns = COLUMN_COUNT;
     x->solver.column = COLUMNS;
+    if (DERIVATIVES != NULL) DERIVATIVES->prepare(x);
     Arena saved = {NULL, 0}, scratch = {NULL, 0};
     for (int pass = 0; pass < 2; pass++) {
         solver_layout(&x->solver, &saved, &scratch, system);

@@ -63,7 +63,7 @@ static double of_event(const Solver *s, const Observed *o, const Variable *v) {
 static int ready(const Solver *s, const Variable *v, double *value) {
     const int embedded = s->system->full != NULL;
     if (is_of_event(v->place)) return ready_of_event(s, v, value);
-    if (v->place >= AT_PEAK_MAX && v->place <= AT_PEAK_MIN_TIME) {
+    if (is_of_peak(v->place)) {
         *value = s->peak[PEAK_PARTS * v->index + (int)(v->place - AT_PEAK_MAX)];
         return 1;
     }

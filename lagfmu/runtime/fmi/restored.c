@@ -176,7 +176,7 @@ static Status each(Instance *x, const Solver *s, const void *base, const Saved *
                         [INPUTS] = system->inputs,
                         [SWITCH_STATES] = system->switches,
                         [PARAMETERS] = system->parameters,
-                        [PEAKS_KEPT] = peaks_saved(s->peaks),
+                        [PEAKS_KEPT] = peaks_saved(s->peaks, s->peak_columns),
                         [WATCHED] = indicators_count(system),
                         [DENSE] = now == NULL ? 0 : now->dense_arrays * solver_width(s),
                         [STEPPED] = solver_width(s),
@@ -234,7 +234,7 @@ static Status together_in_solver(Instance *x, const Solver *s) {
         !(now->event_time >= now->t_old && now->event_time <= now->t_integrator))
         return restored_none(x, "time of the event", now->event_time);
     if (x->started && s->peaks > 0) { /* extremes are known as far as the state is */
-        const double reached = s->peak[peaks_saved(s->peaks) - 1];
+        const double reached = s->peak[peaks_saved(s->peaks, s->peak_columns) - 1];
         if (x->exchange ? reached > now->t : reached != now->t) return restored_none(x, "time of the peaks", reached);
     }
     return OK;

@@ -66,6 +66,7 @@ static inline Place event_part(Place place) {
     return (Place)(AT_DEPARTURE_COUNT + (place - AT_DEPARTURE_COUNT) % 4);
 }
 static inline int is_of_event(Place place) { return place >= AT_DEPARTURE_COUNT && place <= AT_STICKING_V; }
+static inline int is_of_peak(Place place) { return place >= AT_PEAK_MAX && place <= AT_PEAK_MIN_TIME; }
 
 SHARED const Variable *const VARIABLES; /* (VARIABLE_COUNT) */
 SHARED const int VARIABLE_COUNT;

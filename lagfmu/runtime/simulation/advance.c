@@ -282,6 +282,7 @@ Status solver_meet(Solver *s) {
     if (!s->state.now.pending) return OK;
     s->state.now.pending = 0;
     segment_begin(s);
+    if (s->peak_columns > 0) OPTIONAL.variation->peaks_before(s);
     const Status switched = s->columns > 0 ? OPTIONAL.variation->pass(s, switch_modes) : switch_modes(s, NULL, 0, 0);
     if (switched != OK) return FAILED;
     return s->peaks > 0 ? OPTIONAL.peaks->here(s, 0) : OK;

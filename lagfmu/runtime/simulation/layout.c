@@ -55,7 +55,7 @@ void solver_layout(Solver *s, Arena *saved, Arena *scratch, const System *system
     s->drive.first = arena_doubles(saved, system->inputs);
     s->drive.second = arena_doubles(saved, system->inputs);
     s->p = arena_doubles(saved, system->parameters);
-    s->peak = arena_doubles(saved, peaks_saved(s->peaks));
+    s->peak = arena_doubles(saved, peaks_saved(s->peaks, s->peak_columns));
     integrator_layout(&s->probe, scratch, scratch, width, states, OPTIONAL.methods, METHOD_COUNT);
     mechanism_layout(&s->stepped, scratch, system, &s->why,
                      OPTIONAL.friction != NULL ? OPTIONAL.friction->sliding : NULL);
@@ -84,6 +84,7 @@ void solver_layout(Solver *s, Arena *saved, Arena *scratch, const System *system
     if (s->peaks > 0) {
         observed_layout(&s->peak_seen, scratch, system);
         s->work_peaks = arena_doubles(scratch, OPTIONAL.peaks->doubles(s->peaks, width));
+        s->iwork_peaks = arena_ints(scratch, s->peak_columns > 0 ? 2 * s->peaks : 0);
     }
     s->work_gap = arena_doubles(scratch, minimum_gap_doubles(system));
     if (s->columns > 0) OPTIONAL.variation->layout(s, scratch);

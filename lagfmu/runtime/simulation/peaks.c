@@ -13,11 +13,14 @@
 #include <string.h>
 
 #include "extreme.h"
+#include "optional.h"
+#include "column.h"
 #include "segment.h"
 
 enum { PIECES = 8 };
 static const double INWARD = 1e-4;    /* of a piece: the way from an end on which growth is looked for */
 static const double PLACE = 1e-6;     /* of a bracket: how well the place of an extreme is found */
+static const double STATIONARY = 1e-3; /* of a piece: next to the place of an extreme */
 static const double AGREED = 2;       /* times what two integrations differ by: a record passed by more is one */
 static const double PEAK_ROUNDING = 1e-13; /* of a quantity's values */
 
@@ -33,11 +36,12 @@ typedef struct {
     int exchange, passed;     /* 1: of an importer's step; a record was passed in it */
     int quantity;             /* whose extreme is sought, ... */
     double sense, from;       /* ... 1: largest, -1: smallest; [s] from which elapsed time counts */
+    double *before;           /* (PEAK_PARTS peaks) the records as they were */
 } Stretch;
 
-static int doubles_of_peaks(int peaks, int states) { return (PIECES + 2) * (1 + peaks) + 2 * states; }
+static int doubles_of_peaks(int peaks, int states) { return (PIECES + 2 + PEAK_PARTS) * (1 + peaks) + 2 * states; }
 
-static double *reached(const Solver *s) { return s->peak + PEAK_PARTS * s->peaks; }
+static double *reached(const Solver *s) { return s->peak + peaks_saved(s->peaks, s->peak_columns) - 1; }
 
 /* Everything that is kept, at the state of now. */
 static Status measure_peak(Solver *s, double *values) {
@@ -52,17 +56,20 @@ static Status measure_there(Solver *s, double t, const double *y, double *values
     return measure_peak(s, values);
 }
 
-/* The same at time t of the stretch. */
-static Status measure_at(Stretch *x, double t, double *values) {
+/* y at time t of the stretch; NULL: it cannot be projected. */
+static const double *state_at(Stretch *x, double t) {
     Solver *s = x->s;
     const Integrator *i = &s->integrator;
-    const double *y = t == i->t_old ? i->y_old : t == i->t ? i->y : x->y;
-    if (t == x->t[x->count - 1] && x->end != NULL) y = x->end;
-    if (y == x->y) {
-        x->dense(i, t, x->y);
-        if (segment_project(s, t, x->y) != OK) return FAILED;
-    }
-    return measure_there(s, t, y, values);
+    if (t == x->t[x->count - 1] && x->end != NULL) return x->end;
+    if (t == i->t_old || t == i->t) return t == i->t_old ? i->y_old : i->y;
+    x->dense(i, t, x->y);
+    return segment_project(s, t, x->y) == OK ? x->y : NULL;
+}
+
+/* The same at time t of the stretch. */
+static Status measure_at(Stretch *x, double t, double *values) {
+    const double *y = state_at(x, t);
+    return y != NULL ? measure_there(x->s, t, y, values) : FAILED;
 }
 
 static Status height_of_peak(void *context, double elapsed, double *value) {
@@ -99,6 +106,107 @@ static void find(Stretch *x, double t, double height) {
     x->passed |= keep_peaks(s, x->quantity, x->sense, x->t[0], t, height);
 }
 
+/* ------------------------------------------------------------------ their derivatives */
+
+/* 1: the extremes are differentiated. */
+static int is_varied(const Stretch *x) { return x->s->peak_columns > 0 && !x->exchange && *x->s->state.varied; }
+
+static double record_time(const Solver *s, int k, double sense) {
+    return peak_record(s, k)[sense > 0 ? PEAK_MAX_TIME : PEAK_MIN_TIME];
+}
+
+static double *standing_of(const Solver *s, int k, double sense) {
+    return peak_standing(s, k, sense > 0 ? PEAK_MAX : PEAK_MIN);
+}
+
+/* Changes of the records in s->iwork_peaks, at (t, y) of the stretch. */
+static void vary_at(Solver *s, double t, const double *y, PeakKind kind, double near) {
+    state_scatter(s->system, y, s->state.q, s->state.v);
+    columns_scatter(s, y);
+    s->state.now.t = t;
+    OPTIONAL.variation->peaks(s, s->iwork_peaks, kind, near);
+}
+
+/* Of the quantity's record alone. */
+static void vary_one(Stretch *x, double t, const double *y, PeakKind kind) {
+    Solver *s = x->s;
+    memset(s->iwork_peaks, 0, (size_t)(2 * s->peaks) * sizeof *s->iwork_peaks);
+    s->iwork_peaks[2 * x->quantity + (x->sense < 0)] = 1;
+    vary_at(s, t, y, kind, STATIONARY * (x->t[1] - x->t[0]));
+}
+
+/* An extreme inside has been found at (t, y), `more` than the record was. */
+static void vary_inside_of(Stretch *x, double t, const double *y, double more, double record) {
+    Solver *s = x->s;
+    double *standing = standing_of(s, x->quantity, x->sense);
+    const double when = record_time(s, x->quantity, x->sense);
+    if (!is_varied(x)) return;
+    if (when == t) {
+        *standing = PEAK_SETTLED;
+        vary_one(x, t, y, PEAK_INSIDE);
+    } else if (*standing != PEAK_OPEN && when < x->t[0] && fabs(more) <= s->settings.tolerance * fabs(record)) {
+        vary_one(x, t, y, PEAK_AGAIN);
+    }
+}
+
+/* Of a record at the beginning of the stretch: a new one, or one from which the motion has gone on. */
+static Status vary_begin(Stretch *x) {
+    Solver *s = x->s;
+    const double t = x->t[0];
+    double *standing = standing_of(s, x->quantity, x->sense);
+    const int new = x->before[PEAK_PARTS * x->quantity + (x->sense > 0 ? PEAK_MAX_TIME : PEAK_MIN_TIME)] != t;
+    if (record_time(s, x->quantity, x->sense) != t || (!new && *standing == PEAK_SETTLED)) return OK;
+    const double *y = state_at(x, t);
+    if (y == NULL) return FAILED;
+    vary_one(x, t, y, new ? PEAK_GIVEN : *standing == PEAK_OPEN ? PEAK_LEFT : PEAK_START);
+    *standing = PEAK_SETTLED;
+    return OK;
+}
+
+/* Of those at its end, which may grow. */
+static Status vary_end(Stretch *x) {
+    Solver *s = x->s;
+    const double t = x->t[x->count - 1];
+    int any = 0;
+    for (int k = 0; k < s->peaks; k++)
+        for (int side = 0; side < 2; side++) {
+            const double sense = side == 0 ? 1 : -1;
+            const int open = record_time(s, k, sense) == t;
+            if (open) *standing_of(s, k, sense) = PEAK_OPEN;
+            any |= s->iwork_peaks[2 * k + side] = open;
+        }
+    if (!any) return OK;
+    const double *y = state_at(x, t);
+    if (y == NULL) return FAILED;
+    vary_at(s, t, y, PEAK_GIVEN, 0);
+    return OK;
+}
+
+static Status vary_ends(Stretch *x) {
+    for (x->quantity = 0; x->quantity < x->s->peaks; x->quantity++)
+        for (x->sense = 1; x->sense >= -1; x->sense -= 2)
+            if (vary_begin(x) != OK) return FAILED;
+    return vary_end(x);
+}
+
+/* Of the records at the state of now: at the start, or at an event, which those before it go with. */
+static void vary_records_here(Solver *s, int first) {
+    const double t = s->state.now.t;
+    int *which = s->iwork_peaks;
+    if (s->peak_columns == 0 || !*s->state.varied) return;
+    OPTIONAL.variation->peaks(s, which, first ? PEAK_GIVEN : PEAK_EVENT, 0);
+    for (int k = 0; k < s->peaks; k++)
+        for (int side = 0; side < 2; side++) {
+            const double sense = side == 0 ? 1 : -1;
+            double *standing = standing_of(s, k, sense);
+            which[2 * k + side] = !which[2 * k + side] && *standing == PEAK_OPEN && record_time(s, k, sense) == t;
+            if (first || record_time(s, k, sense) == t) *standing = first ? PEAK_BEGUN : PEAK_SETTLED;
+        }
+    if (!first) OPTIONAL.variation->peaks(s, which, PEAK_BEFORE, 0);
+}
+
+/* ------------------------------------------------------------------ on a stretch */
+
 /* Could there be more than the record next to sample j, below which its neighbour i lies? */
 static int may_pass(const Stretch *x, int i, int j) {
     const double fall = at(x, j) - at(x, i);
@@ -118,8 +226,9 @@ static Status polish_extreme(Stretch *x, int i, int k, double elapsed, double va
     }
     if (segment_reach(s, s->integrator.t_old, s->integrator.y_old, t, x->y) != OK) return FAILED;
     if (measure_there(s, t, x->y, x->value) != OK) return FAILED;
-    const double again = x->sense * x->value[x->quantity];
-    if (again - record_of(x) > AGREED * fabs(again - value)) find(x, t, again);
+    const double again = x->sense * x->value[x->quantity], record = record_of(x);
+    if (again - record > AGREED * fabs(again - value)) find(x, t, again);
+    vary_inside_of(x, t, x->y, again - record, record);
     return OK;
 }
 
@@ -157,13 +266,14 @@ static Status look_at_all(Stretch *x, double t) {
     const int pieces = (int)fmin(fmax(ceil(PIECES * (t - begin) / step), 2), PIECES);
     x->count = pieces + 1;
     for (int j = 0; j <= pieces; j++) x->t[j] = j == pieces ? t : begin + (t - begin) * j / pieces;
+    memcpy(x->before, s->peak, (size_t)(PEAK_PARTS * s->peaks) * sizeof *x->before);
     for (int j = 0; j <= pieces; j++)
         if (measure_at(x, x->t[j], x->values + j * s->peaks) != OK) return FAILED;
     for (x->quantity = 0; x->quantity < s->peaks; x->quantity++)
         for (x->sense = 1; x->sense >= -1; x->sense -= 2)
             if (look_on_stretch(x) != OK) return FAILED;
     *reached(s) = t;
-    return OK;
+    return is_varied(x) ? vary_ends(x) : OK;
 }
 
 /* The same with memory, and with the state of now put back. */
@@ -175,9 +285,12 @@ static Status look_at_time(Stretch *x, double t) {
     x->value = x->values + (PIECES + 1) * s->peaks;
     x->y = x->value + s->peaks;
     double *held = x->y + s->integrator.ny;
+    x->before = held + s->integrator.ny;
     state_gather(s->system, s->state.q, s->state.v, held);
+    if (s->columns > 0) columns_gather(s, held);
     const Status status = look_at_all(x, t);
     state_scatter(s->system, held, s->state.q, s->state.v);
+    if (s->columns > 0) columns_scatter(s, held);
     s->state.now.t = now;
     return status;
 }
@@ -232,11 +345,14 @@ static Status here(Solver *s, int first) {
             kept[PEAK_MAX] = kept[PEAK_MIN] = values[k];
             kept[PEAK_MAX_TIME] = kept[PEAK_MIN_TIME] = t;
         }
-        keep_peaks(s, k, 1, t, t, values[k]);
-        keep_peaks(s, k, -1, t, t, -values[k]);
+        const int more = keep_peaks(s, k, 1, t, t, values[k]), less = keep_peaks(s, k, -1, t, t, -values[k]);
+        if (s->peak_columns == 0) continue;
+        s->iwork_peaks[2 * k] = first || (more && record_time(s, k, 1) == t);
+        s->iwork_peaks[2 * k + 1] = first || (less && record_time(s, k, -1) == t);
     }
     *reached(s) = s->state.now.t_old = t;
     begin_step(s);
+    vary_records_here(s, first); /* evaluates elsewhere */
     return OK;
 }
 

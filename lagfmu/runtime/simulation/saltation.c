@@ -47,6 +47,10 @@ void saltation_layout(Solver *s, Arena *scratch) {
     x->was = arena_doubles(scratch, saltation_modes_size(system));
     x->modes = arena_doubles(scratch, saltation_modes_size(system));
     x->others = arena_doubles(scratch, saltation_modes_size(system));
+    const int peaks = s->peak_columns > 0 ? s->peaks : 0;
+    x->peak_changes = arena_doubles(scratch, peaks);
+    x->peak_rates = arena_doubles(scratch, peaks);
+    x->peak_before = arena_doubles(scratch, peaks);
 }
 
 /* ------------------------------------------------------------------ the end of the columns */
@@ -68,8 +72,7 @@ const char *saltation_ended(Solver *s, Why *text) {
 
 static double natural_pace(const Solver *s) { return s->state.now.rate > 0 ? s->state.now.rate : 1; }
 
-/* phi (states) at (t, y). */
-static Status flow_at(Solver *s, double t, const double *y, double *flow) {
+Status saltation_flow(Solver *s, double t, const double *y, double *flow) {
     const System *system = s->system;
     segment_begin(s);
     if (segment_motion_near(s, segment_instant(s, t), y, y + system->nq) != OK) return FAILED;
@@ -83,10 +86,10 @@ static Status find_flow_before(Solver *s) {
     struct Saltation *x = s->saltation;
     const int n = system_states(s->system);
     const double t = s->state.now.t;
-    if (flow_at(s, t, x->from, x->flow_before) != OK) return FAILED;
+    if (saltation_flow(s, t, x->from, x->flow_before) != OK) return FAILED;
     const double step = saltation_step(s, (Way){1, x->from, x->flow_before, -1, NULL});
     for (int j = 0; j < n; j++) x->there[j] = x->from[j] - step * x->flow_before[j];
-    if (flow_at(s, t - step, x->there, x->turn) != OK) return FAILED;
+    if (saltation_flow(s, t - step, x->there, x->turn) != OK) return FAILED;
     for (int j = 0; j < n; j++) x->turn[j] = (x->flow_before[j] - x->turn[j]) / step;
     return OK;
 }
@@ -94,7 +97,7 @@ static Status find_flow_before(Solver *s) {
 static Status find_flow_after(Solver *s) {
     struct Saltation *x = s->saltation;
     state_gather(s->system, s->state.q, s->state.v, x->there);
-    return flow_at(s, s->state.now.t, x->there, x->flow_after);
+    return saltation_flow(s, s->state.now.t, x->there, x->flow_after);
 }
 
 /* What is known without differences of an event: its time, and where it was; nothing moves at once. */

@@ -18,6 +18,7 @@ struct Saltation {
     int limit;                       /* the first of those that are passed; -1: no event */
     double pace;                     /* [1/s] the motion's natural rate; quicker where a limit is passed slowly */
     double *was, *modes, *others;    /* (saltation_modes_size()) before the map, after it, and beside that */
+    double *peak_changes, *peak_rates, *peak_before; /* (peaks) of peak_changes.c */
     Why ended;
 };
 
@@ -45,6 +46,9 @@ typedef struct {
     Numbers now;
     int start;
 } Jump;
+
+/* phi (states) at (t, y). */
+SHARED Status saltation_flow(Solver *s, double t, const double *y, double *flow);
 
 /* kept.c: z (column_size()) of the state, and back. */
 SHARED void saltation_gather(const Solver *s, double *z);

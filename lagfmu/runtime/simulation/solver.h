@@ -64,6 +64,12 @@ typedef struct Solver {
     int peaks;                 /* how many quantities' extremes are kept (peaks.h); set before the layout */
     Status (*measure)(struct Solver *s, const Observed *o, double *values); /* (peaks) of them at a state */
     double *peak;              /* what is kept of them, saved behind the state's arrays */
+    int peak_columns;          /* 0, or `columns`: their extremes are differentiated; set before the layout */
+    /* (peaks) Their changes at the state of now: along column c; -1: with time, along the motion. */
+    Status (*measure_change)(struct Solver *s, int c, double *changes);
+    /* The name of part `part` of quantity k, if its derivative by column c is asked for; else NULL. */
+    const char *(*peak_asked)(int c, int k, int part);
+    int *iwork_peaks;          /* (2 peaks) of peaks.c */
     int columns;               /* how many columns of derivatives go with the state (variation.h), and ... */
     const Column *column;      /* (columns) ... by what; both are set before the layout */
     struct Saltation *saltation; /* of saltation.c; NULL without columns */

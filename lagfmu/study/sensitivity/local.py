@@ -170,10 +170,8 @@ def made_for(
 ) -> Iterator[Path]:
     """An FMU as it is; of a model, or a model file, one that tells derivatives and extremes among `of`."""
     by = "*" if to in (ALL, [ALL], (ALL,)) else ",".join(to)
-    plain = [n for n in of if not names.measured(n)]
-    asked = [f"{','.join(plain)}:{by}"] if plain else []
     peaks = [n for text in of if (n := names.measured(text))]
-    with as_fmu(source, scene, peaks=peaks, sensitivities=asked) as path:
+    with as_fmu(source, scene, peaks=peaks, sensitivities=[f"{','.join(of)}:{by}"]) as path:
         yield path
 
 
