@@ -92,6 +92,9 @@ class Single:
     ) -> None:
         self.library, self.time, self.between = library, 0.0, between
         self.log: list[tuple[int, str, str]] = []
+        self.broken: BaseException | None = (
+            None  # what went wrong where the FMU called, which hides it
+        )
         self.logger, self.update = LOGGER(self._logged), UPDATE(self._updated)
         token = library.description.instantiationToken if token is None else token
         common = name, token.encode(), None, c_bool(False), c_bool(True)
@@ -109,15 +112,20 @@ class Single:
         self.log.append((status, category.decode(), text.decode()))
 
     def _updated(self, _, time, asked, readable, finished, returns, requested, when) -> None:
-        assert asked != readable
-        assert readable == finished
-        end = self.between(self, time, asked, returns)
+        try:
+            assert asked != readable
+            assert readable == finished
+            end = self.between(self, time, asked, returns)
+        except BaseException as error:
+            self.broken, end = self.broken or error, None
         if end is not None:
             requested[0], when[0] = True, end
 
     def call(self, function: str, *arguments: Any) -> int:
         """The status of fmi3FUNCTION(instance, arguments)."""
         status: int = getattr(self.library.dll, f"fmi3{function}")(self.handle, *arguments)
+        if self.broken is not None:
+            raise self.broken
         return status
 
     def does(self, function: str, *arguments: Any) -> None:

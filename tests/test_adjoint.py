@@ -64,6 +64,13 @@ def test_the_adjoint_is_the_transposed_jacobian(library3, name):
     np.testing.assert_allclose(found, seed @ directional, rtol=1e-11, atol=1e-11 * scale)
 
 
+def test_a_constraint_runs_away_from_what_stands_still(library3):
+    """phi - omega t at a given phi: -omega a second."""
+    one = library3("RotatingWire")().start()
+    for function in ("GetDirectionalDerivative", "GetAdjointDerivative"):
+        assert one.derive(function, ["residual.drive"], ["time"], [1.0]) == [-2.0]
+
+
 @pytest.mark.filterwarnings("ignore::lagfmu.testing.RedundantConstraintWarning")
 def test_the_adjoint_of_redundant_rows(library3, built):
     """Where one constraint follows from others: of Q, of the motion and of what is unique."""

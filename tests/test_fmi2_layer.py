@@ -270,6 +270,8 @@ def test_categories_are_switched_one_by_one(pendulum):
     assert warnings(one) == 0
     one.does("SetDebugLogging", 1, c_size_t(0), None)
     assert warnings(one) == 1
+    one.does("SetDebugLogging", 0, c_size_t(1), names)
+    assert warnings(one) == 0
     one.does("SetDebugLogging", 1, c_size_t(1), (c_char_p * 1)(b"logEvents"))
     assert warnings(one) == 0
     one.does("SetDebugLogging", 0, c_size_t(0), None)
@@ -521,8 +523,9 @@ def test_input_derivatives_last_until_the_input_is_set_again(library):
     assert one.get("F") == 3.0
     assert "'F' = nan" in one.refuses("SetReal", *one.set_call("F", math.nan))
     assert one.get("F") == 3.0
-    bad = one.references(["F"]), c_size_t(1), (c_int * 1)(3), (c_double * 1)(1.0)
-    assert "derivative 3 of 'F'" in one.refuses("SetRealInputDerivatives", *bad)
+    for order in (0, 3):
+        bad = one.references(["F"]), c_size_t(1), (c_int * 1)(order), (c_double * 1)(1.0)
+        assert f"derivative {order} of 'F'" in one.refuses("SetRealInputDerivatives", *bad)
 
 
 # ---------------------------------------------------------------------------- Model Exchange

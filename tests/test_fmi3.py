@@ -113,6 +113,25 @@ def test_many_runs_in_one_call_are_those_of_fmi_2(native_fmu: Fmu, fmi3_fmu: Fmu
     assert (np.diff(found[0][:, 0]) < 0).all()  # the lower it begins, the sooner it leaves
 
 
+def test_many_runs_in_one_call_meet_their_events_themselves(
+    prepared: Callable[[str], Prepared], tmp_path: Path
+) -> None:
+    """An importer of an FMU with clocks handles events; in many runs nobody does, and a departure at the very
+    end of a run has happened.  Afterwards the importer is told of its own again."""
+    path = write(prepared("Hemisphere"), tmp_path, target="native", face=Face(3, clocks=True))
+
+    def last(of: str, times: Any) -> float:
+        plan = Plan(vary=("theta",), keep=((f"departure.surface.{of}", 0),), times=times)
+        return float(run_batch(session, plan, np.array([[0.1]])).result[0, 0])
+
+    with Session(path) as session:
+        departure = last("time", np.linspace(0.0, 2.0, 21))
+        times = np.append(np.arange(0.0, departure, 0.1), departure)
+        assert last("count", times) == 1
+        session.run(times.tolist(), {"theta": 0.1})
+        assert session.instance.told[0].value
+
+
 def test_an_array_holds_what_its_members_are(
     prepared: Callable[[str], Prepared], tmp_path: Path
 ) -> None:
@@ -127,7 +146,9 @@ def test_an_array_holds_what_its_members_are(
         session.begin()
         assert "Q.N" not in session.outputs
         slave, array = session.instance, session.reference["Q.N"]
-        assert list(slave.getFloat64([array, session.reference["Q.x"]], nValues=3))[2] != 0.0
+        found = list(slave.getFloat64([array, array, session.reference["Q.x"]], nValues=5))
+        assert found == [*found[:2], *found[:2], found[0]]
+        assert 0.0 not in found
         with pytest.raises(FMICallException):
             slave.setFloat64([array], [1.0, 2.0])
         with pytest.raises(FMICallException):

@@ -426,7 +426,7 @@ def test_the_importer_may_ask_for_an_early_return(library3, early):
     lib = library3("CartPendulum")
 
     def asks(one, time, asked, returns):
-        assert returns <= early
+        assert returns <= (early and time < 1.0)  # at its end there is nothing to return from
         return 0.33 if not asked and time > 0.2 and one.time < 0.1 else None
 
     one = lib(early=early, between=asks, named=["s"]).start(tolerance=1e-10)
