@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shutil
 import zipfile
+import zlib
 
 import numpy as np
 import pytest
@@ -195,6 +196,22 @@ def test_a_pdf_is_printed_where_there_is_a_browser(native_fmu, tmp_path, monkeyp
     content = (tmp_path / "h.pdf").read_bytes()
     assert content.startswith(b"%PDF")
     assert re.search(rb"/Count [2-9]", content)
+
+
+@pytest.mark.skipif(not shutil.which("firefox"), reason="no Firefox on this machine")
+def test_a_pdf_is_printed_by_firefox_where_there_is_no_chromium(native_fmu, tmp_path, monkeypatch):
+    """Through the protocol that it listens to: A4 pages of the whole report, and no process is left."""
+    monkeypatch.delenv("CHROMIUM", raising=False)
+    monkeypatch.setattr(report_pdf, "CHROMIUM", ())
+    run("report", native_fmu("Hemisphere"), "-o", tmp_path / "h.pdf")
+    content = (tmp_path / "h.pdf").read_bytes()
+    assert content.startswith(b"%PDF")
+    packed = re.findall(rb"stream\r?\n(.*?)\r?\nendstream", content, re.DOTALL)
+    opened = [zlib.decompress(part) for part in packed if part[:1] == b"x"]
+    assert re.search(rb"/Count [2-9]", b"".join(opened))
+    monkeypatch.setattr(report_pdf, "FIREFOX", ("false",))
+    with pytest.raises(BuildError, match=r"cannot print the report: it ended with 1"):
+        report_pdf.printed("<p>nothing", "h.pdf")
 
 
 def test_the_page_fits_a_telephone(hemisphere, browser):

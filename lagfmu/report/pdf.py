@@ -9,22 +9,30 @@ import tempfile
 from pathlib import Path
 
 from ..errors import BuildError
+from . import firefox
 
-BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome", "msedge")
+CHROMIUM = ("chromium", "chromium-browser", "google-chrome", "chrome", "msedge")
+FIREFOX = ("firefox", "firefox-esr")
 PATIENCE = 120.0  # s
 
 
 def printed(page: str, what: str) -> bytes:
     """The bytes of a PDF.  Raises BuildError without a browser that prints."""
-    browser = os.environ.get("CHROMIUM") or next(filter(None, map(shutil.which, BROWSERS)), None)
-    if browser is None:
+    browser = os.environ.get("CHROMIUM") or _installed(*CHROMIUM)
+    other = _installed(*FIREFOX)
+    if browser is None and other is None:
         raise BuildError(
-            f"{what!r}: a PDF needs Chromium or Chrome, and none was found (CHROMIUM names one elsewhere): "
-            "write a .html file, and print it from any browser"
+            f"{what!r}: a PDF needs Chromium, Chrome or Firefox, and none was found (CHROMIUM names one of "
+            "the first two elsewhere): write a .html file, and print it from any browser"
         )
-    with tempfile.TemporaryDirectory(prefix="lagfmu_") as folder:
+    with tempfile.TemporaryDirectory(prefix="lagfmu_", ignore_cleanup_errors=True) as folder:
         source, target = Path(folder, "report.html"), Path(folder, "report.pdf")
         source.write_text(page, encoding="utf-8")
+        if browser is None:
+            try:
+                return firefox.printed(str(other), source, Path(folder), PATIENCE)
+            except OSError as error:  # TimeoutError is one
+                raise BuildError(f"{other!r} cannot print the report: {error}") from None
         command = [
             browser,
             "--headless",
@@ -45,3 +53,7 @@ def printed(page: str, what: str) -> bytes:
                 f"{browser!r} cannot print the report: {said[-1] if said else 'no reason'}"
             )
         return target.read_bytes()
+
+
+def _installed(*browsers: str) -> str | None:
+    return next(filter(None, map(shutil.which, browsers)), None)

@@ -40,7 +40,7 @@ def report(
     statements: str | os.PathLike[str] | None = None,
 ) -> Path:
     """Write a report of an FMU (or of a model, or a model file, which is built), or of the table of a sweep,
-    to `out`: .html, or .pdf where Chromium is installed.
+    to `out`: .html, or .pdf where Chromium or Firefox is installed.
 
     It is run twice, at its tolerance and at a hundredth of it, and verified as verify() does; `study` is a
     table that `sweep` wrote, .parquet or .csv, of the same FMU.  A `source` that is such a table gives a

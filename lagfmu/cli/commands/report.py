@@ -16,7 +16,7 @@ def report(
         Path, typer.Argument(help="A model file, an FMU, or the table of a sweep (.parquet, .csv).")
     ],
     out: Annotated[
-        Path, typer.Option("--out", "-o", help="report.html, or report.pdf with Chromium.")
+        Path, typer.Option("--out", "-o", help="report.html, or report.pdf with a browser.")
     ] = Path("report.html"),
     study: Annotated[
         Path | None, typer.Option(help="The table of a sweep of this FMU, to stand in the report.")
