@@ -88,9 +88,9 @@ from .numeric.start_priority import GIVEN, OMITTED
 from .numeric.system import System
 from .page.documentation import page as documentation_page
 from .page.documentation import with_figures
+from .page.packed import pack as pack_picture
+from .page.packed import values as picture_values
 from .page.picture import as_bytes, direction, picture_of, read_picture
-from .page.picture import pack as pack_picture
-from .page.picture import values as picture_values
 from .page.preset import IN_FMU, preset_of, read_preset
 from .page.savings import NATIVE, OPERATIONS, savings
 from .page.table import print_whole

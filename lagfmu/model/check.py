@@ -17,7 +17,7 @@ from .frictions import check_frictions
 from .kinds import check_energy, check_names, check_types
 from .outputs import check_output_units, check_outputs
 from .page import check_page
-from .picture import check_picture
+from .picture_check import check_picture
 from .reactions import reaction_units, reactions_in
 from .shapes import unusable_surfaces
 from .speeds import check_rates, check_speeds

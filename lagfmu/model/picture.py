@@ -13,8 +13,7 @@ from typing import Any
 import sympy as sp
 
 from .attitude import rotation_matrix
-from .elements import Expr, ModelFields, name_of
-from .symbols import known_symbols, symbols_in
+from .elements import Expr
 
 Point = tuple[Expr, ...]
 
@@ -35,20 +34,29 @@ class Line:
 
 
 @dataclass(frozen=True)
-class Rod:
-    """A bar between two joints; with a `radius` [m] a cylinder."""
+class _Between:
+    """What lies between two points."""
 
     start: Point
     end: Point
+
+    @property
+    def points(self) -> tuple[Point, ...]:
+        """Both."""
+        return self.start, self.end
+
+
+@dataclass(frozen=True)
+class Rod(_Between):
+    """A bar between two joints; with a `radius` [m] a cylinder."""
+
     radius: Expr | None = None
 
 
 @dataclass(frozen=True)
-class Spring:
+class Spring(_Between):
     """A coil spring between two points."""
 
-    start: Point
-    end: Point
     coils: int = 8
 
 
@@ -118,11 +126,8 @@ def axes_of(dimensions: int, rotation: Any) -> list[Point]:
 
 
 @dataclass(frozen=True)
-class Ground:
+class Ground(_Between):
     """What does not move: a line, hatched on the right-hand side of the way from start to end."""
-
-    start: Point
-    end: Point
 
 
 @dataclass(frozen=True)
@@ -171,101 +176,16 @@ Shape = (
     Line | Rod | Spring | Disk | Sphere | Box | Ground | Track | Pivot | Frame | Arrow | Direction
 )
 SHAPES = (Line, Rod, Spring, Disk, Sphere, Box, Ground, Track, Pivot, Frame, Arrow, Direction)
+POINTS = ("center", "size", "point", "vector", "at", "axis", "along", "force")
 PIVOTS = ("pin", "sleeve", "plate")  # turns about its axis, slides along it, slides across it
 
 
 def points_of(shape: Shape) -> list[Point]:
     """The points and directions of a shape."""
-    if isinstance(shape, Line):
+    if isinstance(shape, Line | _Between):
         return list(shape.points)
-    if isinstance(shape, Rod | Spring | Ground):
-        return [shape.start, shape.end]
-    if isinstance(shape, Disk | Sphere):
-        return [shape.center]
-    if isinstance(shape, Box):
-        return [shape.center, shape.size]
-    if isinstance(shape, Track):
-        return [shape.point]
-    if isinstance(shape, Direction):
-        return [shape.vector]
-    if isinstance(shape, Frame):
-        return [shape.at]
-    given = (shape.axis,) if isinstance(shape, Pivot) else (shape.along, shape.force)
-    return [shape.at, *(p for p in given if p is not None)]
-
-
-def check_picture(model: ModelFields, problems: list[str]) -> None:
-    """What is wrong with the picture: kinds, points, symbols, constraints that are not there."""
-    sizes = set()
-    for number, shape in enumerate(model.picture, 1):
-        what = f"picture, shape {number}"
-        if not isinstance(shape, SHAPES):
-            known = ", ".join(s.__name__ for s in SHAPES)
-            problems.append(f"{what} is {shape!r}, expected one of {known}")
-            continue
-        what += f" ({type(shape).__name__})"
-        wrong = [p for p in points_of(shape) if not _is_point(p)]
-        problems += [
-            f"{what}: {p!r} is no point, expected (x, y) or (x, y, z), each a number or a SymPy expression"
-            for p in wrong
-        ]
-        if wrong:
-            continue
-        sizes |= {len(p) for p in points_of(shape)}
-        if isinstance(shape, Line) and len(shape.points) < 2:
-            problems.append(f"{what}: {len(shape.points)} points, expected two or more")
-        if isinstance(shape, Line) and shape.length is not None and len(shape.points) > 2:
-            problems.append(
-                f"{what}: {len(shape.points)} points and a length, expected two: what hangs slack is a "
-                "string between two points"
-            )
-        if isinstance(shape, Arrow):
-            _check_arrow(model, shape, what, problems)
-        if isinstance(shape, Box | Frame) and not _is_rotation(shape):
-            problems.append(
-                f"{what}: its rotation is {shape.rotation!r}, expected an angle in the plane; in space a "
-                "matrix of 3 rows whose columns are its axes, or a unit quaternion (w, x, y, z)"
-            )
-            continue
-        if isinstance(shape, Pivot) and shape.kind not in PIVOTS:
-            problems.append(
-                f"{what}: its kind is {shape.kind!r}, expected one of {', '.join(PIVOTS)}"
-            )
-        problems += [
-            f"{what}: {name} is neither coordinate, parameter nor input: declare it, or use output(name)"
-            for name in sorted(set(_unknown(model, shape)))
-        ]
-    if len(sizes) > 1:
-        problems.append(
-            "the picture has points in the plane and in space: write all with as many coordinates"
-        )
-
-
-def _is_point(point: object) -> bool:
-    return (
-        isinstance(point, tuple | list)
-        and len(point) in (2, 3)
-        and all(
-            isinstance(sp.sympify(x, strict=False), sp.Expr) and not isinstance(x, str)
-            for x in point
-        )
-    )
-
-
-def _is_rotation(shape: Box | Frame) -> bool:
-    try:
-        return all(map(_is_point, shape.axes)) and len(set(map(len, points_of(shape)))) == 1
-    except (TypeError, ValueError, sp.SympifyError):
-        return False
-
-
-def _check_arrow(model: ModelFields, arrow: Arrow, what: str, problems: list[str]) -> None:
-    known = [c.name for c in model.constraints if hasattr(c, "expression")]
-    if arrow.constraint not in known and arrow.force is None:
-        problems.append(
-            f"{what}: no constraint is called {arrow.constraint!r}, expected one of "
-            f"{', '.join(known) or 'none: the model has no constraint'}"
-        )
+    found = (getattr(shape, name, None) for name in POINTS)
+    return [p for p in found if p is not None]
 
 
 def expressions_of(shape: Shape) -> Iterator[Expr]:
@@ -279,16 +199,3 @@ def expressions_of(shape: Shape) -> Iterator[Expr]:
         yield from (sp.sympify(x) for axis in shape.axes for x in axis)
     if isinstance(shape, Track):
         yield from (sp.sympify(x) for x in (shape.first, shape.last))
-
-
-def _unknown(model: ModelFields, shape: Shape) -> Iterator[str]:
-    """Names that are none of the model's; those with a dot are outputs."""
-    extra = model.embedding.coordinates if model.embedding else {}
-    known = known_symbols(model) | set(extra)
-    own = {o.name for o in model.outputs}
-    if isinstance(shape, Track):
-        known.add(shape.over)
-    for expression in expressions_of(shape):
-        for symbol in symbols_in(expression):
-            if symbol not in known and "." not in str(symbol) and str(symbol) not in own:
-                yield name_of(symbol)

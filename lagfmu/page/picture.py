@@ -1,38 +1,28 @@
 """A model's picture as data: {"dimensions": 2 or 3, "shapes": [{"kind": "rod", "points": [...]}, ...]}.
 
-An expression is a number, the name of an FMU's variable, or a list [operation, operand, ...].  It travels
-in the FMU (resources/picture.json); the live page evaluates it, and `values` does for films.  It is data:
-nothing of it is ever run.
+It travels in the FMU (resources/picture.json); its expressions are those of packed.py.
 """
 
 from __future__ import annotations
 
 import json
-import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numpy as np
 import sympy as sp
 
 from ..errors import BuildError, ModelError
 from ..mechanics.equations import TIME
-from ..model.attitude import Attitude, ClosedFunction
 from ..model.closed_form import in_variables
 from ..model.elements import Expr
 from ..model.model import Model, Nonholonomic
 from ..model.picture import (
     PIVOTS,
     Arrow,
-    Box,
     Direction,
     Disk,
-    Frame,
-    Ground,
-    Line,
     Pivot,
     Point,
-    Rod,
     Shape,
     Sphere,
     Spring,
@@ -40,37 +30,9 @@ from ..model.picture import (
     points_of,
 )
 from ..model.reactions import multiplier
-from ..model.spline import SplineBase
-from ..numeric.closed import rotation
-from ..numeric.cubic import Cubic
 from ..prepare.prepare import Prepared
+from .packed import Packed, checked, names_of, pack
 
-Packed = float | str | list[Any]
-FUNCTIONS: Mapping[Any, str] = {
-    **{f: f.__name__ for f in (sp.sin, sp.cos, sp.tan, sp.asin, sp.acos, sp.atan, sp.atan2)},
-    **{f: f.__name__ for f in (sp.sinh, sp.cosh, sp.tanh, sp.exp, sp.log, sp.sign)},
-    **{sp.Abs: "abs", sp.Min: "min", sp.Max: "max", sp.Add: "+", sp.Mul: "*", sp.Pow: "^"},
-}
-
-
-def _spline(x: Any, periodic: float, *rows: float) -> Any:
-    """A table at x: whether it repeats, then a knot and its four coefficients, row by row."""
-    knots, *columns = (rows[k::5] for k in range(5))
-    table = Cubic(knots, list(zip(*columns, strict=True)), bool(periodic))
-    return np.vectorize(table, otypes=[float])(x)
-
-
-OPERATIONS: Mapping[str, Callable[..., Any]] = {
-    "+": lambda *x: sum(x),
-    "*": lambda *x: math.prod(x),
-    "^": np.power,
-    **{name: getattr(np, name) for name in ("sin", "cos", "tan", "sinh", "cosh", "tanh")},
-    **{name: getattr(np, name) for name in ("exp", "log", "sign", "abs")},
-    **{"asin": np.arcsin, "acos": np.arccos, "atan": np.arctan, "atan2": np.arctan2},
-    "spline": _spline,
-    "attitude": lambda i, j, *e: rotation(e)[3 * int(i) + int(j)] / sum(x**2 for x in e),
-    **{"min": lambda *x: np.minimum.reduce(x), "max": lambda *x: np.maximum.reduce(x)},
-}
 FIELDS = {  # kind -> names of its points, lists of points, single expressions, and the rest
     "line": ((), ("points",), ("length",), ()),
     "rod": ((), ("points",), ("radius",), ()),
@@ -84,8 +46,8 @@ FIELDS = {  # kind -> names of its points, lists of points, single expressions, 
     "arrow": (("at", "vector"), (), (), ("name",)),
     "direction": (("vector",), (), (), ("name",)),
 }
+KINDS = {Sphere: "disk", Track: "path"}  # others are called as their class
 OPTIONAL = ("length", "radius", "angle", "axis", "coils", "trace")
-DEEPEST = 200
 IN_FMU = "resources/picture.json"
 
 
@@ -116,55 +78,43 @@ def picture_of(prepared: Prepared) -> dict[str, Any] | None:
 
 def _packed(model: Model, shape: Shape, numbers: Mapping[str, Any]) -> dict[str, Any]:
     def expression(e: Expr) -> Packed:
-        return pack(in_variables(e), numbers)
+        return pack(in_variables(sp.sympify(e)), numbers)
 
     def point(p: Point) -> list[Packed]:
         return [expression(x) for x in p]
 
-    def single(**values: Expr | None) -> dict[str, Any]:
-        return {key: expression(sp.sympify(e)) for key, e in values.items() if e is not None}
+    def line(points: Sequence[Point]) -> list[list[Packed]]:
+        return [point(p) for p in points]
 
-    kind = type(shape).__name__.lower()
-    if isinstance(shape, Line):
-        points = [point(p) for p in shape.points]
-        return {"kind": kind, "points": points, **single(length=shape.length)}
-    if isinstance(shape, (Rod, Ground, Spring)):
-        found: dict[str, Any] = {"kind": kind, "points": [point(shape.start), point(shape.end)]}
-        if isinstance(shape, Spring):
+    kind = KINDS.get(type(shape), type(shape).__name__.lower())
+    found: dict[str, Any] = {"kind": kind}
+    for keys, packed in zip(FIELDS[kind], (point, line, expression), strict=False):
+        for key in keys:
+            if (value := getattr(shape, key, None)) is not None:
+                found[key] = packed(value)
+    match shape:
+        case Spring():
             found["coils"] = int(shape.coils)
-        return found | (single(radius=shape.radius) if isinstance(shape, Rod) else {})
-    if isinstance(shape, Track):
-        reach = [expression(shape.first), expression(shape.last)]
-        over = {"over": str(shape.over), "range": reach}
-        return {"kind": "path", "point": point(shape.point), **over}
-    if isinstance(shape, Disk):
-        found = single(radius=shape.radius, angle=shape.angle)
-        found |= {"trace": True} if shape.trace else {}
-        return {"kind": kind, "center": point(shape.center), **found}
-    if isinstance(shape, Sphere):
-        return {"kind": "disk", "center": point(shape.center), **single(radius=shape.radius)}
-    if isinstance(shape, Box):
-        axes = [point(axis) for axis in shape.axes]
-        return {
-            "kind": kind,
-            "center": point(shape.center),
-            "size": point(shape.size),
-            "axes": axes,
-        }
-    if isinstance(shape, Frame):
-        return {"kind": kind, "at": point(shape.at), "axes": [point(axis) for axis in shape.axes]}
-    if isinstance(shape, Pivot):
-        of = {"of": "ball"} if shape.axis is None else {"of": shape.kind, "axis": point(shape.axis)}
-        return {"kind": kind, "at": point(shape.at), **of}
-    if isinstance(shape, Direction):
-        return {"kind": kind, "name": shape.name, "vector": point(shape.vector)}
-    if shape.force is not None:
-        vector = point(shape.force)
-    else:
-        along = direction(model, shape) if shape.along is None else shape.along
-        force = multiplier(shape.constraint)
-        vector = [pack(in_variables(sp.sympify(x)) * force, numbers) for x in along]
-    return {"kind": "arrow", "name": shape.constraint, "at": point(shape.at), "vector": vector}
+        case Track():
+            found |= {"over": str(shape.over), "range": point((shape.first, shape.last))}
+        case Disk():
+            found |= {"trace": True} if shape.trace else {}
+        case Pivot():
+            found["of"] = "ball" if shape.axis is None else shape.kind
+        case Direction():
+            found["name"] = shape.name
+        case Arrow():
+            found |= {"name": shape.constraint, "vector": _force(model, shape, numbers)}
+    return found
+
+
+def _force(model: Model, arrow: Arrow, numbers: Mapping[str, Any]) -> list[Packed]:
+    """Its components [N]."""
+    if arrow.force is not None:
+        return [pack(in_variables(sp.sympify(x)), numbers) for x in arrow.force]
+    along = direction(model, arrow) if arrow.along is None else arrow.along
+    force = multiplier(arrow.constraint)
+    return [pack(in_variables(sp.sympify(x)) * force, numbers) for x in along]
 
 
 def direction(model: Model, arrow: Arrow) -> tuple[Expr, ...]:
@@ -195,58 +145,11 @@ def direction(model: Model, arrow: Arrow) -> tuple[Expr, ...]:
     return tuple(sp.simplify(solved[0][f]) for f in unknown)
 
 
-def pack(expression: Expr, numbers: Mapping[str, Any] = {}) -> Packed:
-    """An expression of the FMU's variables as data.  Raises ValueError for a function it cannot hold."""
-    if expression.is_Symbol:
-        name = str(expression)
-        return float(numbers[name]) if name in numbers else name
-    if expression.is_number:
-        value = float(expression)
-        if not math.isfinite(value):
-            raise ValueError(f"{expression} is no finite number")
-        return value
-    if isinstance(expression, SplineBase) and expression.order == 0:
-        table = expression.spline.table
-        rows = [
-            float(x) for k, c in zip(table.knots, table.coefficients, strict=True) for x in (k, *c)
-        ]
-        return ["spline", pack(expression.args[0], numbers), float(table.periodic), *rows]
-    if isinstance(expression, Attitude):
-        return ["attitude", *(pack(a, numbers) for a in expression.args)]
-    if isinstance(expression, ClosedFunction):
-        return pack(expression.opened(), numbers)
-    operation = FUNCTIONS.get(expression.func)
-    if operation is None:
-        known = ", ".join(sorted(f for f in FUNCTIONS.values() if f.isalpha()))
-        raise ValueError(
-            f"{expression} cannot be drawn, expected sums, products, powers, tables, {known}"
-        )
-    return [operation, *(pack(a, numbers) for a in expression.args)]
-
-
 def names_in(shape: Mapping[str, Any]) -> set[str]:
-    """The variables of a shape."""
-    return _names(shape) - {shape.get("over")}
-
-
-def _names(packed: Any) -> set[str]:
-    """The variables of a shape, and what its path runs over."""
-    if isinstance(packed, Mapping):
-        points, lists, single, _ = FIELDS[packed["kind"]]
-        keys = (*points, *lists, *single, "range")
-        return set().union(*(_names(packed[k]) for k in keys if k in packed))
-    if isinstance(packed, str):
-        return set() if packed in OPERATIONS else {packed}
-    return set().union(*map(_names, packed)) if isinstance(packed, list) else set()
-
-
-def values(packed: Packed, look: Callable[[str], Any]) -> Any:
-    """The value of an expression; `look` gives a variable's value, or an array of them."""
-    if isinstance(packed, str):
-        return look(packed)
-    if isinstance(packed, list):
-        return OPERATIONS[packed[0]](*(values(p, look) for p in packed[1:]))
-    return packed
+    """The variables of a shape; what its path runs over is none."""
+    points, lists, single, _ = FIELDS[shape["kind"]]
+    values = [shape[k] for k in (*points, *lists, *single, "range") if k in shape]
+    return names_of(values) - {shape.get("over")}
 
 
 def as_bytes(picture: Mapping[str, Any]) -> bytes:
@@ -279,11 +182,11 @@ def _checked_shape(shape: Mapping[str, Any]) -> dict[str, Any]:
             continue
         value = shape[key]
         if key in points or key == "range":
-            value = [_checked(x) for x in value]
+            value = [checked(x) for x in value]
         elif key in lists:
-            value = [[_checked(x) for x in p] for p in value]
+            value = [[checked(x) for x in p] for p in value]
         elif key in single:
-            value = _checked(value)
+            value = checked(value)
         elif key in ("over", "name"):
             value = str(value)
         elif key == "of":
@@ -300,19 +203,3 @@ def _one_of(value: object, known: tuple[str, ...]) -> str:
     if value not in known:
         raise ValueError(f"{value!r}, expected one of {', '.join(known)}")
     return str(value)
-
-
-def _checked(packed: Any, depth: int = 0) -> Packed:
-    if depth > DEEPEST:
-        raise ValueError("an expression is nested too deeply")
-    if isinstance(packed, str):
-        return packed
-    if isinstance(packed, list) and packed and packed[0] in OPERATIONS and len(packed) > 1:
-        if packed[0] == "spline" and (len(packed) < 8 or len(packed) % 5 != 3):
-            raise ValueError(f"a table of {len(packed) - 3} numbers, expected five a row")
-        if packed[0] == "attitude" and (len(packed) != 7 or {*packed[1:3]} - {0, 1, 2}):
-            raise ValueError(f"an attitude {packed[1:]}, expected row, column and a quaternion")
-        return [packed[0], *(_checked(p, depth + 1) for p in packed[1:])]
-    if isinstance(packed, int | float) and not isinstance(packed, bool) and math.isfinite(packed):
-        return float(packed)
-    raise ValueError(f"{packed!r} is no expression")
