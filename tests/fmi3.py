@@ -22,11 +22,11 @@ from pathlib import Path
 from typing import Any
 
 import fmpy
+from single import OK, Caller
 
 from lagfmu.methods import NUMBERS
 from lagfmu.testing import host
 
-OK, WARNING, DISCARD, ERROR, FATAL = range(5)
 LOGGER = ctypes.CFUNCTYPE(None, c_void_p, c_int, c_char_p, c_char_p)
 POINTER = ctypes.POINTER
 FLAGS = (c_bool, c_bool, c_bool, c_bool)
@@ -76,8 +76,10 @@ class Library:
         return Single(self, **options)
 
 
-class Single:
+class Single(Caller):
     """One instance; `log` holds (status, category, message)."""
+
+    version = 3
 
     def __init__(
         self,
@@ -91,10 +93,7 @@ class Single:
         name: bytes = b"one",
     ) -> None:
         self.library, self.time, self.between = library, 0.0, between
-        self.log: list[tuple[int, str, str]] = []
-        self.broken: BaseException | None = (
-            None  # what went wrong where the FMU called, which hides it
-        )
+        super().__init__()
         self.logger, self.update = LOGGER(self._logged), UPDATE(self._updated)
         token = library.description.instantiationToken if token is None else token
         common = name, token.encode(), None, c_bool(False), c_bool(True)
@@ -120,26 +119,6 @@ class Single:
             self.broken, end = self.broken or error, None
         if end is not None:
             requested[0], when[0] = True, end
-
-    def call(self, function: str, *arguments: Any) -> int:
-        """The status of fmi3FUNCTION(instance, arguments)."""
-        status: int = getattr(self.library.dll, f"fmi3{function}")(self.handle, *arguments)
-        if self.broken is not None:
-            raise self.broken
-        return status
-
-    def does(self, function: str, *arguments: Any) -> None:
-        """The call succeeds."""
-        status = self.call(function, *arguments)
-        assert status == OK, (function, status, self.log[-1:])
-
-    def refuses(self, function: str, *arguments: Any, status: int = ERROR) -> str:
-        """The call returns `status`; its reason."""
-        count = len(self.log)
-        assert self.call(function, *arguments) == status, (function, self.log[count:])
-        assert len(self.log) == count + 1, (function, self.log[count:])
-        assert self.log[-1][0] == status
-        return self.log[-1][2]
 
     # ------------------------------------------------------------------ whole steps of a life
 

@@ -7,7 +7,7 @@ import math
 from ctypes import byref, c_double
 
 import pytest
-from fmi2 import DISCARD
+from single import DISCARD
 from sympy import Rational, sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
 

@@ -10,6 +10,7 @@ import fmi2
 import fmpy.fmi3
 import pytest
 from fmi2 import EXCHANGE
+from single import DISCARD
 
 from lagfmu.testing import find_compiler
 
@@ -160,7 +161,7 @@ def in_state2(library, state: str, exchange: bool) -> Any:
         one.does("EnterContinuousTimeMode")
     if state == "F":
         one.step(0.1)
-        one.refuses("DoStep", c_double(0.1), c_double(1e-300), 1, status=fmi2.DISCARD)
+        one.refuses("DoStep", c_double(0.1), c_double(1e-300), 1, status=DISCARD)
     if state == "T":
         one.does("Terminate")
     return one

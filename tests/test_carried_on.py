@@ -7,7 +7,8 @@ from ctypes import byref, c_double, c_int, c_size_t
 
 import pytest
 import sympy as sp
-from fmi2 import CO_SIMULATION, EXCHANGE, OK, Library
+from fmi2 import CO_SIMULATION, EXCHANGE, Library
+from single import OK
 from sympy import cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 

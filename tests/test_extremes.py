@@ -19,11 +19,11 @@ import pytest
 import scipy
 from conftest import FILES, of_each_kind
 from coupled_model import absorber
-from fmi2 import DISCARD, ERROR, OK
 from fmpy.fmi1 import FMICallException
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from instance import Instance, instance
+from single import DISCARD, ERROR, OK
 from sympy import cos, sin, sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
 

@@ -9,7 +9,8 @@ from ctypes import byref, c_double, c_size_t
 from pathlib import Path
 
 import pytest
-from fmi2 import CO_SIMULATION, DISCARD, EXCHANGE, OK, Library, Single
+from fmi2 import CO_SIMULATION, EXCHANGE, Library, Single
+from single import DISCARD, OK
 
 from lagfmu import Scene
 from lagfmu.testing import find_compiler, load

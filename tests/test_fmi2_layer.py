@@ -16,7 +16,8 @@ from ctypes import (
 
 import numpy as np
 import pytest
-from fmi2 import DISCARD, ERROR, EXCHANGE, Library
+from fmi2 import EXCHANGE, Library
+from single import DISCARD, ERROR
 
 from lagfmu.methods import NUMBERS
 from lagfmu.testing import find_compiler

@@ -15,7 +15,8 @@ import numpy as np
 import pytest
 import sympy
 from conftest import scene_of
-from fmi3 import ERROR, Single
+from fmi3 import Single
+from single import ERROR
 from sympy.physics.mechanics import dynamicsymbols
 from test_jumps import MODELS as JUMPS
 

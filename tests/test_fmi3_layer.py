@@ -9,7 +9,8 @@ from ctypes import byref, c_bool, c_char_p, c_double, c_int, c_size_t, c_uint32,
 from xml.etree import ElementTree
 
 import pytest
-from fmi3 import DISCARD, ERROR, LOGGER
+from fmi3 import LOGGER
+from single import DISCARD, ERROR
 
 from lagfmu.testing import find_compiler
 

@@ -13,9 +13,10 @@ from ctypes import c_double
 from pathlib import Path
 
 import pytest
-from fmi2 import EXCHANGE, OK, Library, Single
+from fmi2 import EXCHANGE, Library, Single
 from fmpy.fmi1 import FMICallException
 from instance import instance
+from single import OK
 from sympy import symbols
 from sympy.physics.mechanics import dynamicsymbols
 

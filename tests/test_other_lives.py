@@ -6,7 +6,8 @@ from __future__ import annotations
 from ctypes import c_double
 
 import pytest
-from fmi2 import ERROR, Single
+from fmi2 import Single
+from single import ERROR
 from test_ahead import candle
 
 LIVES = {  # when the state is saved [s], and another life: its parameters and how long it lasts [s]

@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 import pytest
 import sympy as sp
-from fmi2 import DISCARD
 from fmpy.fmi1 import FMICallException
 from instance import Instance, instance
 from runs import simulate_fmu
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
+from single import DISCARD
 from sympy.physics.mechanics import dynamicsymbols
 from tops import E, R, W, body, turning
 
