@@ -48,6 +48,11 @@ static int take_seed(Component *c, const Call *call, const Group *group, unsigne
     return component_refuse(c, text.text);
 }
 
+/* Quaternions that are set are normalized: of a direction there is what is left of it then. */
+static void settle_direction(Instance *x) {
+    mechanism_settle_change(&x->solver.stepped, x->solver.state.q, x->solver.sensitivity.dq);
+}
+
 static int is_derived(const Variable *v) { return v->role == ROLE_OUTPUT || v->role == ROLE_START; }
 
 /* Can partial derivatives be had now, and are there all arrays? */
@@ -71,6 +76,8 @@ int component_directional(Component *c, const Call *call, const Group *group, co
     Direction d = no_direction(&c->instance.solver.sensitivity);
     for (size_t k = 0; k < known_count; k++)
         if (take_seed(c, call, group, knowns[k], seed[k], &d) != CALL_OK) return CALL_ERROR;
+    if (instance_observe(&c->instance) != OK) return component_no_value(c);
+    settle_direction(&c->instance);
     if (instance_differentiate(&c->instance, d) != OK) return component_no_value(c);
     for (size_t k = 0; k < unknown_count; k++) {
         const Variable *v = component_find(c, call, unknowns[k], group);
@@ -103,6 +110,7 @@ int component_adjoint(Component *c, const Call *call, const Group *group, const 
     for (size_t k = 0; k < known_count; k++) {
         Direction d = no_direction(&x->solver.sensitivity);
         if (take_seed(c, call, group, knowns[k], 1, &d) != CALL_OK) return CALL_ERROR;
+        settle_direction(x);
         if (instance_gradient(x, unknowns, seed, unknown_count, d, &sensitivity[k], &undefined) == OK) continue;
         return undefined != NULL ? component_no_derivative(c, call, undefined) : component_no_value(c);
     }

@@ -112,6 +112,16 @@ static Status kinematics_settle(const Mechanism *b, double t, double *q, const d
     return OK;
 }
 
+static void kinematics_settle_change(const Mechanism *b, const double *q, double *dq) {
+    const System *s = b->system;
+    for (int k = 0; k < s->quaternions; k++) {
+        const int *e = s->quaternion + 4 * k;
+        double along = 0;
+        for (int i = 0; i < 4; i++) along += q[e[i]] * dq[e[i]];
+        for (int i = 0; i < 4; i++) dq[e[i]] -= along * q[e[i]];
+    }
+}
+
 static void kinematics_change(const Mechanism *b, double t, const double *q, const double *v, const double *u,
                    const double *p, double dt, const double *dq, const double *dv, const double *du,
                    const double *dp, double *dB, double *changed) {
@@ -121,6 +131,6 @@ static void kinematics_change(const Mechanism *b, double t, const double *q, con
     for (int e = 0; e < s->rates; e++) changed[s->rate_row[e]] += dB[e] * v[s->rate_column[e]];
 }
 
-static const Kinematics OF_SPEEDS = {kinematics_layout, kinematics_evaluate, kinematics_rates, kinematics_move,
-                                     kinematics_reach,  kinematics_settle,   kinematics_change};
+static const Kinematics OF_SPEEDS = {kinematics_layout, kinematics_evaluate, kinematics_rates,         kinematics_move,
+                                     kinematics_reach,  kinematics_settle,   kinematics_settle_change, kinematics_change};
 SHARED_VALUE const Kinematics *const KINEMATICS = &OF_SPEEDS;

@@ -23,6 +23,8 @@ typedef struct {
     /* Unit quaternions of norm 1, and angles within pi of what they equal modulo 2 pi.  FAILED: a quaternion of
      * norm 0, or one of these that is not finite. */
     Status (*settle)(const struct Mechanism *b, double t, double *q, const double *u, const double *p);
+    /* Of a change (nq) of q, what is left of it once the quaternions have norm 1 again. */
+    void (*settle_change)(const struct Mechanism *b, const double *q, double *dq);
     /* change (nq) of B v + b along (dt, dq, dv, du, dp); dB (rates): scratch. */
     void (*change)(const struct Mechanism *b, double t, const double *q, const double *v, const double *u,
                    const double *p, double dt, const double *dq, const double *dv, const double *du,

@@ -126,6 +126,11 @@ static inline Status mechanism_settle(const Mechanism *b, Instant at, double *q)
     return b->system->kinematics != NULL ? KINEMATICS->settle(b, at.t, q, at.u, at.p) : OK;
 }
 
+/* A change (nq) of coordinates turns unit quaternions, and does nothing else to them. */
+static inline void mechanism_settle_change(const Mechanism *b, const double *q, double *dq) {
+    if (b->system->kinematics != NULL) KINEMATICS->settle_change(b, q, dq);
+}
+
 /* M, F, G, nu, gamma, B, b at a state.  FAILED if one is not finite. */
 SHARED Status mechanism_evaluate(Mechanism *b, Instant at, const double *q, const double *v);
 

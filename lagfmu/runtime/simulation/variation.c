@@ -91,16 +91,6 @@ static void variation_rates(Solver *s, double t, const double *y, double *rates)
 
 /* ------------------------------------------------------------------ projection */
 
-/* A change of a unit quaternion turns it. */
-static void settle_quaternions(const System *system, const double *q, double *dq) {
-    for (int k = 0; k < system->quaternions; k++) {
-        const int *e = system->quaternion + 4 * k;
-        double along = 0;
-        for (int i = 0; i < 4; i++) along += q[e[i]] * dq[e[i]];
-        for (int i = 0; i < 4; i++) dq[e[i]] -= along * q[e[i]];
-    }
-}
-
 static Status project_places(Solver *s, Instant at, const double *y, int c, double *S) {
     const System *system = s->system;
     Mechanism *b = &s->stepped;
@@ -143,7 +133,7 @@ static Status project_columns(Solver *s, Instant at, double *y) {
     for (int c = 0; c < s->columns; c++) {
         double *S = y + n * (1 + c);
         if (fixed && project_places(s, at, y, c, S) != OK) return FAILED;
-        settle_quaternions(system, y, S);
+        mechanism_settle_change(b, y, S);
     }
     if (acting && linear_factor(&b->linear, b->M, b->G, active) != OK) return FAILED;
     for (int c = 0; c < s->columns && acting; c++)
