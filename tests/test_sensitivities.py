@@ -129,6 +129,20 @@ def test_when_the_particle_leaves_the_hemisphere(varied):
         assert abs(found[f"sensitivity.departure.surface.time.by.{by}"] - value) < 1e-10, by
 
 
+@pytest.mark.parametrize("stops", [False, True])
+def test_they_come_through_an_fmu_of_fmi_3(built, stops):
+    """The same, whether its importer stops at the event, with early return and event mode, or not."""
+    file, scene = scene_of("Hemisphere")
+    asked = replace(scene, sensitivities=("departure.surface.time:a,theta",))
+    fmu = built(file.model, asked, fmi=3)
+    how = {"early_return_allowed": stops, "use_event_mode": stops}
+    found = run(fmu, 1.0, 4, {"theta": 0.3}, **how)[-1]
+    time = "departure.surface.time"
+    assert found["sensitivity.valid"]
+    assert abs(found[f"sensitivity.{time}.by.a"] - found[time] / 2) < 1e-10
+    assert abs(found[f"sensitivity.{time}.by.theta"] + 1.01696078397883) < 1e-10
+
+
 def test_the_flight_after_the_departure(varied):
     """It leaves at cos theta = (2/3) cos theta0, whatever a and g are, with v^2 = g a cos theta; then it
     flies, and r^2 = a^2 + v^2 tau^2 - a g cos(theta) tau^2 + v g sin(theta) tau^3 + g^2 tau^4/4 at tau
