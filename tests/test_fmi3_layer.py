@@ -12,7 +12,7 @@ import pytest
 from fmi3 import LOGGER
 from single import DISCARD, ERROR
 
-from lagfmu.testing import find_compiler
+from lagfmu.testing import Face, described, find_compiler, write
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
 
@@ -130,6 +130,21 @@ def test_log_categories_are_switched(pendulum):
 
 
 # ---------------------------------------------------------------------------- dependencies
+
+
+def test_dependencies_that_the_description_leaves_out_are_refused_in_words(
+    prepared, library3, tmp_path, monkeypatch
+):
+    """Not as if the variable were no unknown: who asks learns that it may depend on all."""
+    monkeypatch.setattr(described, "MOST", 5)
+    path = write(prepared("PendulumCartesian"), tmp_path, face=Face(3))
+    with zipfile.ZipFile(path) as archive:
+        assert b"dependencies=" not in archive.read("modelDescription.xml")
+    one = library3(path)(exchange=True).start()
+    for name in ("lambda.rod", "der(x,2)"):
+        (reference,) = one.references([name])
+        ask = "GetNumberOfVariableDependencies", c_uint32(reference), byref(c_size_t())
+        assert "all states and inputs" in one.refuses(*ask)
 
 
 @pytest.mark.parametrize("name", ["Hemisphere", "CartPendulum", "RotatingWire"])

@@ -18,6 +18,7 @@ from .archive import pack, tool
 from .bundle import BUNDLE, bundled, reached
 from .capabilities import interfaces_of
 from .compiler import HOST, Platform, chosen, compile_libraries, host, is_first
+from .described import untold
 from .description import guid_of, model_description
 from .description3 import arrays, build_description, dependencies
 from .face import USUAL, Face
@@ -135,7 +136,7 @@ def sources_of(prepared: Prepared, listed: bool = True, face: Face = USUAL) -> S
     }
     gone |= generated.keys() | {file for file in everything if not face.holds(file)}
     if face.fmi == 3:
-        told = (*dependencies(table), arrays(table))
+        told = (*dependencies(table), arrays(table), not untold(table))
         generated["interface.c"] = interface_source(scene.name, *told).encode()
     own = [f for f in everything if f.endswith(".c") and f not in gone]
     found = reached({**everything, **generated}, [*own, *generated])

@@ -20,6 +20,7 @@ static const Unknown INITIALLY[] = {{{initially}}};
 static const Unknown RUNNING[] = {{{running}}};
 static const Unknown HOLDING[] = {{{arrays}}};
 
+SHARED_VALUE const int DEPENDENCIES_TOLD = {told};
 SHARED_VALUE const unsigned *const KNOWNS = POOL;
 SHARED_VALUE const Unknowns INITIAL_UNKNOWNS = {{INITIALLY, {initial_count}}};
 SHARED_VALUE const Unknowns RUNNING_UNKNOWNS = {{RUNNING, {running_count}}};
@@ -28,9 +29,10 @@ SHARED_VALUE const Unknowns ARRAYS = {{HOLDING, {array_count}}};
 
 
 def interface_source(
-    name: str, initially: Dependencies, running: Dependencies, arrays: Dependencies
+    name: str, initially: Dependencies, running: Dependencies, arrays: Dependencies, told: bool
 ) -> str:
-    """C text that defines the dependencies during the initialization, and after it, and what is in arrays.
+    """C text that defines the dependencies during the initialization, and after it, where they are `told`,
+    and what is in arrays.
 
     What depends on the same, or holds it, shares one list.
     """
@@ -47,6 +49,7 @@ def interface_source(
         running_count=len(rows[1]),
         arrays=texts[2] or "{0, 0, 0}",
         array_count=len(rows[2]),
+        told=int(told),
     )
 
 

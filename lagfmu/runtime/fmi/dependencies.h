@@ -15,6 +15,7 @@ typedef struct {
     int count;
 } Unknowns;
 
+SHARED const int DEPENDENCIES_TOLD; /* 0: of a large mechanism they are left out: each may depend on all */
 SHARED const Unknowns INITIAL_UNKNOWNS, RUNNING_UNKNOWNS; /* before the end of the initialization, and after it */
 SHARED const Unknowns ARRAYS; /* likewise: what is in the array of that value reference, VARIABLE_COUNT and on */
 SHARED const unsigned *const KNOWNS;

@@ -41,7 +41,10 @@ static const Unknown *find_unknown(Component *c, const Call *call, fmi3ValueRefe
     Why text;
     for (int k = 0; k < all->count; k++)
         if (all->rows[k].reference == reference) return &all->rows[k];
-    if (reference < (unsigned)VARIABLE_COUNT)
+    if (!DEPENDENCIES_TOLD)
+        (void)fail(&text, "%s: this FMU is too large to say what its variables depend on, as modelDescription.xml "
+                   "does not: take each to depend on all states and inputs", call->name);
+    else if (reference < (unsigned)VARIABLE_COUNT)
         (void)fail(&text, "%s: '%s' is none of the unknowns of the model structure here", call->name,
                    VARIABLES[reference].name);
     else
