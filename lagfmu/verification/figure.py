@@ -6,12 +6,12 @@ import io
 from pathlib import Path
 from typing import Any
 
+import matplotlib
 from matplotlib.figure import Figure
 
 from ..errors import BuildError, UsageError
 
 STYLE: dict[str, Any] = {
-    "svg.hashsalt": "lagfmu",
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.grid": True,
@@ -35,7 +35,8 @@ def save(figure: Figure, path: Path) -> Path:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         metadata = {"Date": None} if path.suffix == ".svg" else {}
-        figure.savefig(path, metadata=metadata, dpi=150)
+        with matplotlib.rc_context({"svg.hashsalt": "lagfmu"}):
+            figure.savefig(path, metadata=metadata, dpi=150)
     except ValueError as error:
         raise UsageError(f"cannot write the figure {str(path)!r}: {error}") from None
     except OSError as error:
