@@ -72,6 +72,21 @@ def test_the_best_friction_of_the_documentation_is_the_best(tmp_path, monkeypatc
     assert all(told["remaining"]([factor * best])[0] > least for factor in (0.9, 1.1))
 
 
+@pytest.mark.skipif("not __import__('shutil').which('cc')", reason="no C compiler")
+def test_gemseo_finds_the_same_friction(tmp_path, monkeypatch):
+    """The page's discipline with the FMU's own derivative: the same minimum, in as few runs."""
+    pytest.importorskip("gemseo_fmu")
+    page = (MODELS.parent / "docs" / "sensitivities.md").read_text(encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    run("build", MODELS / "cart_pendulum.py", "--sensitivities", "energy.total:c", "--no-check")
+    (block,) = (b for b in re.findall(r"```python\n(.*?)```", page, re.DOTALL) if "gemseo" in b)
+    told: dict = {}
+    exec(block, told)
+    scenario = told["scenario"]
+    assert scenario.optimization_result.x_opt[0] == pytest.approx(8.35, rel=1e-3)
+    assert len(scenario.formulation.optimization_problem.database) < 20
+
+
 def test_beside_other_events_there_is_no_difference(native_fmu):
     """With a plain start r = 1 a larger radius lets the particle start inside of the sphere, a smaller one in
     the air: a change of r meets other events, and gets no number."""
