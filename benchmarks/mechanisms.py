@@ -35,6 +35,7 @@ from lagfmu.bodies import (
     Revolute,
     Rolling,
     SpringDamper,
+    Torque,
     Torsion,
     Universal,
     mechanism,
@@ -243,9 +244,118 @@ def pushed_boat(run: Callable[..., Any]) -> Statements:
     yield "angle = M t^2/(2 J)", largest(turn)
 
 
+def peaucellier(run: Callable[..., Any]) -> Statements:
+    crank = Body("crank", 0.3, 0.001)
+    arms = [Body(f"arm{i}", 1.0, 0.02) for i in (1, 2)]
+    bars = [Body(f"bar{i}", 0.5, 0.003) for i in (1, 2, 3, 4)]
+    far = [arm.at((0.25, 0)) for arm in arms]
+    left, right = [[bar.at((x, 0)) for bar in bars] for x in (-0.125, 0.125)]
+    end = crank.at((0.075, 0))
+    joints = [
+        Revolute("P", ground.at((0.15, 0)), crank.at((-0.075, 0))),
+        *(Revolute(f"O{i}", ground.at((0, 0)), arms[i].at((-0.25, 0))) for i in (0, 1)),
+        *(Revolute(f"B{i}", end, left[i]) for i in (0, 1)),
+        *(Revolute(f"C{i}", far[i], right[i]) for i in (0, 1)),
+        *(Revolute(f"C{i}{i}", far[i], left[2 + i]) for i in (0, 1)),
+        Revolute("D", right[2], right[3]),
+    ]
+    drive, load = Motor("drive", "P", motion=0.5), Force("load", right[2], (0, 100.0))
+    start = {"angle.O0": 0.6105, "angle.O1": -0.1105}
+    made = run([crank, *arms, *bars], joints, [drive, load], start=start, read={"tip": right[2]})
+    x, z = (0.5**2 - 0.25**2) / 0.3, 0.5 / 2
+    yield "x of a straight line [m]", largest(made["tip.position.x"] - x)
+    yield "y of the inverse [m]", largest(made["tip.position.y"] - x * tan(z))
+    yield "torque by virtual work [N.m]", largest(made["torque.P.z"] + 100 * x / 2 / cos(z) ** 2)
+
+
+def flyball_governor(run: Callable[..., Any]) -> Statements:
+    spindle = Body("spindle", 5.0, (0.03, 0.03, 0.05))
+    sleeve = Body("sleeve", 3.0, (0.01, 0.01, 0.01))
+    joints = [
+        Revolute("A", ground.at((0, 0, 0)), spindle.at((0, 0, 0))),
+        Prismatic("S", spindle.at((0, 0, 0)), sleeve.at((0, 0, 0)), axis="z"),
+    ]
+    bodies = [spindle, sleeve]
+    for s, sign in (("r", 1), ("l", -1)):
+        arm = Body(f"arm_{s}", 2.0, (0.01, 0.01, 0.001), center=(0, 0, -0.3))
+        link = Body(f"link_{s}", 0.1, (0.001, 0.001, 0.0001))
+        hip, foot = (b.at((sign * 0.02, 0, 0)) for b in (spindle, sleeve))
+        joints += [
+            Revolute(f"hip_{s}", hip, arm.at((0, 0, 0)), axis="y"),
+            Revolute(f"knee_{s}", arm.at((0, 0, -0.2)), link.at((0, 0, 0.1)), axis="y"),
+            Revolute(f"foot_{s}", link.at((0, 0, -0.1)), foot, axis="y"),
+        ]
+        bodies += [arm, link]
+    start = {"angle.hip_r": -0.5, "angle.hip_l": 0.5, "der(angle.A)": 10.0}
+    loads = [Gravity((0, 0, -g)), Motor("engine", "A", torque=0.5)]
+    made = run(bodies, joints, loads, None, start=start)
+    yield "two arms alike [rad]", largest(made["angle.hip_r"] + made["angle.hip_l"])
+    work = made["energy.total"] - 0.5 * made["angle.A"]
+    yield "energy less the engine's work [J]", largest(work - work[0])
+
+
+def cardan_in_z(run: Callable[..., Any]) -> Statements:
+    a, shaft = 0.5, (0.001, 0.02, 0.02)
+    one, two = (Body(name, 2.0, (0.01, 0.01, 0.01)) for name in ("one", "two"))
+    tube, rod = (Body(name, 1.0, shaft) for name in ("tube", "rod"))
+    end = (0.4 + cos(a), sin(a), 0)
+    joints = [
+        Revolute("A", ground.at((0, 0, 0)), one.at((0, 0, 0)), axis="x"),
+        Universal("U", one.at((0.2, 0, 0)), tube.at((-0.2, 0, 0)), axis="z", second_axis="y"),
+        Prismatic("S", tube.at((0, 0, 0)), rod.at((0, 0, 0)), axis="x"),
+        Universal("V", rod.at((0.2, 0, 0)), two.at((-0.2, 0, 0)), axis="y", second_axis="z"),
+        Revolute("B", ground.at(end), two.at((0, 0, 0)), axis="x"),
+    ]
+    start = {"tube.rpy": (0, 0, a), "rod.rpy": (0, 0, a), "der(angle.B)": 20.0}
+    drive, brake = Motor("drive", "A", motion=w.symbol * t), Torque("brake", two, (-50.0, 0, 0))
+    made = run([one, tube, rod, two], joints, [drive, brake], None, parameters=[w], start=start)
+    yield "output turns as input [rad]", largest(made["angle.B"] - made["angle.A"])
+    J, x = 0.002, made["angle.A"]
+    ratio = cos(a) / (1 - (sin(a) * np.sin(x)) ** 2)  # of the shaft between
+    bend = ratio**2 / cos(a) * sin(a) ** 2 * np.sin(2 * x) * 400
+    yield "drive's power [W]", largest(made["drive.power"] - 20 * (50 + J * ratio * bend))
+
+
+def excavator(run: Callable[..., Any]) -> Statements:
+    boom, stick = Body("boom", 500.0, 700.0), Body("stick", 250.0, 120.0, center=(0.2, 0))
+    lift, lifting = Body("lift", 40.0, 4.0), Body("lifting", 20.0, 2.0)
+    dig, digging = Body("dig", 30.0, 3.0), Body("digging", 15.0, 1.5)
+    joints = [
+        Revolute("foot", ground.at((0, 1.5)), boom.at((-2, 0))),
+        Revolute("elbow", boom.at((2, 0)), stick.at((-0.3, 0))),
+        Revolute("A", ground.at((0.8, 1.0)), lift.at((-0.6, 0))),
+        Prismatic("L", lift.at((0, 0)), lifting.at((0, 0)), limits=(0.2, 1.4)),
+        Revolute("B", lifting.at((0.5, 0)), boom.at((-0.5, 0.2))),
+        Revolute("C", boom.at((0, 0.4)), dig.at((-0.6, 0))),
+        Prismatic("D", dig.at((0, 0)), digging.at((0, 0)), limits=(0.5, 1.4)),
+        Revolute("E", digging.at((0.5, 0)), stick.at((-0.7, 0))),
+    ]
+    a, b = (Parameter(symbols(n), x, "m") for n, x in (("a", 0.45), ("b", 0.8)))
+    v = Parameter(symbols("v"), 0.1, "m/s")
+    loads = [
+        Gravity((0, -g)),
+        Motor("raise", "L", motion=a.symbol + v.symbol * t),
+        Motor("curl", "D", motion=b.symbol + v.symbol * t),
+        Force("bucket", stick.at((1.5, 0)), (0.0, -5000.0)),
+    ]
+    bodies, start = (
+        [boom, stick, lift, lifting, dig, digging],
+        {"angle.foot": 0.6, "position.L": 0.45},
+    )
+    made = run(bodies, joints, loads, parameters=[a, b, v], start=start)
+    reach = made["position.L"] + 1.1, made["position.D"] + 1.1
+    foot, elbow = made["angle.foot"], made["angle.elbow"]
+    eye = hypot(1.5, 0.2), np.arctan2(0.2, 1.5) + foot
+    x, y = eye[0] * np.cos(eye[1]) - 0.8, eye[0] * np.sin(eye[1]) + 0.5
+    yield "length of the lift cylinder [m]", largest(np.hypot(x, y) - reach[0])
+    x, y = 2 - 0.4 * np.cos(elbow), -0.4 - 0.4 * np.sin(elbow)
+    yield "length of the dig cylinder [m]", largest(np.hypot(x, y) - reach[1])
+
+
 MECHANISMS = (
     *(watt, scotch_yoke, gate_and_arm, planetary, quick_return, trebuchet, toggle_clamp),
     *(car_on_a_hill, cardan_shaft, swash_plate, turntable, spinning_top, pushed_boat),
+    *(peaucellier, flyball_governor, cardan_in_z, excavator),
 )
 
 

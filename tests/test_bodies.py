@@ -769,3 +769,39 @@ def test_a_mechanism_of_the_plane_is_not_told_to_take_one():
     with pytest.warns(UserWarning, match="follow from the others") as told:
         prepare(plane(bodies=[bar], joints=joints))
     assert not any("Spherical" in str(w.message) for w in told)
+
+
+def _lift(**more):
+    """A boom on a cylinder, whose stroke that closes is 0.446 m, or its mirror image."""
+    boom, tube, rod = Body("boom", 500.0, 700.0), Body("tube", 40.0, 4.0), Body("rod", 20.0, 2.0)
+    given = {
+        "plane": "xy",
+        "bodies": [boom, tube, rod],
+        "joints": [
+            Revolute("foot", ground.at((0, 1.5)), boom.at((-2, 0))),
+            Revolute("A", ground.at((0.8, 1.0)), tube.at((-0.6, 0))),
+            Prismatic("L", tube.at((0, 0)), rod.at((0, 0)), axis="x", limits=(0.2, 1.4)),
+            Revolute("B", rod.at((0.5, 0)), boom.at((-0.5, 0.2))),
+        ],
+    }
+    return mechanism("Lift", **given | more)
+
+
+def test_a_motor_that_the_joints_cannot_follow_is_named_with_the_remedy():
+    """A boom 1.5 m long to its eye never is 9 m away from the foot of its cylinder."""
+    with pytest.raises(
+        ModelError, match=r"motor 'M' prescribes .* by Motor\(\.\.\., start=\.\.\.\)"
+    ):
+        _lift(loads=[Motor("M", "L", motion=True, start=8.0)])
+
+
+def test_a_joint_that_is_assembled_beyond_its_limits_is_told_with_its_place():
+    """A reversed cylinder closes too: a start of its stroke takes the one that is meant."""
+    eye = complex(1.5, 0.2) * complex(cos(0.6), sin(0.6)) + 1.5j - complex(0.8, 1.0)
+    with pytest.warns(
+        UserWarning, match=r"position\.L is assembled at -2\.64\d+, beyond its limits"
+    ):
+        _lift(start={"angle.foot": 0.6, "position.L": -abs(eye) - 1.1})
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        _lift(start={"angle.foot": 0.6, "position.L": abs(eye) - 1.1})

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -72,8 +72,11 @@ def assemble(
     if missed.max(initial=0.0) > CLOSED:
         q, missed = moving.closed([f], np.zeros(len(closing)), q)
     if missed.max(initial=0.0) > CLOSED:
-        raise ModelError(model.name, list(_open([c.name for c in closing], f.values(q), missed)))
+        motors = {name for name, line in model.parts if line.startswith("motor")}
+        missing = _open([c.name for c in closing], f.values(q), missed, motors)
+        raise ModelError(model.name, list(missing))
     _tell(model, places, held.values(q), size)
+    _tell_beyond_limits(model, draft, parts, q)
     if moving.is_determined([f, held], q) and has_loop(draft, parts):
         measures = {n: of.values[0] for n, of in draft.relative.items() if n not in places}
 
@@ -239,8 +242,10 @@ def _struck(model: Model, q: Array, v: Array, size: float) -> list[Contact]:
     return [c for c, gap, rate in found if abs(gap) <= CLOSED * size and rate < 0]
 
 
-def _open(names: Sequence[str], values: Array, missed: Array) -> Iterator[str]:
-    """Which joints miss, the worst first."""
+def _open(
+    names: Sequence[str], values: Array, missed: Array, motors: Collection[str]
+) -> Iterator[str]:
+    """Which joints miss, and which motors, the worst first."""
     if not np.isfinite(values).all():
         lost = {n.split(".")[0] for n, x in zip(names, values, strict=True) if not np.isfinite(x)}
         for joint in sorted(lost):
@@ -258,10 +263,39 @@ def _open(names: Sequence[str], values: Array, missed: Array) -> Iterator[str]:
                 f"universal joint {joint!r} cannot be closed: at the nearest that was found its axes miss "
                 f"being square by {off:.3g} degrees: turn a marker, or choose other axes"
             )
+        elif joint in motors and miss > CLOSED:
+            yield (
+                f"motor {joint!r} prescribes what the joints cannot follow: the nearest that was found "
+                f"misses it by {value:.3g} (m or rad): begin elsewhere, by motion= or, of an input, by "
+                "Motor(..., start=...)"
+            )
         elif miss > CLOSED:
             yield (
                 f"joint {joint!r} cannot be closed: the nearest that was found misses it by {value:.3g} "
                 "(m or rad): correct a length, or give a start nearer to where it closes"
+            )
+
+
+def _tell_beyond_limits(model: Model, draft: Draft, parts: Sequence[Any], q: Array) -> None:
+    """Joints that were assembled beyond a limit, with how to choose another place."""
+    for part in parts:
+        if getattr(part, "limits", None) is None:
+            continue
+        stops = [model.constraint(f"{part.name}.{end}") for end in ("lower", "upper")]
+        name = part.measures[0]
+        value, *gaps = Rows(
+            model,
+            [
+                (e, sp.S.Zero)
+                for e in (draft.relative[name].values[0], *(c.expression for c in stops))
+            ],
+        ).values(q)
+        if min(gaps) < -CLOSED:
+            warnings.warn(
+                f"model {model.name!r}: {name} is assembled at {float(value)!r}, beyond its limits: "
+                f"start {name!r} within them, as otherwise it moves to where the joints close, if they do",
+                GivenStartWarning,
+                stacklevel=5,
             )
 
 
