@@ -103,4 +103,7 @@ def test_theta_determines_x_and_y(native_fmu):
             with pytest.raises(Exception, match="failed with status"):
                 one.start({name: 0.5})
             told = [text for _, _, text in one.log]
-            assert any(f"'{name}' is calculated and cannot be set" in text for text in told)
+            assert any(
+                f"'{name}' is calculated and cannot be set: set coordinates" in text
+                for text in told
+            )

@@ -12,7 +12,7 @@ from typing import Any
 from ..methods import unknown
 
 MESSAGES = {  # in the order in which they are looked at
-    "settable": "'{name}' is calculated and cannot be set",
+    "settable": "'{name}' is calculated and cannot be set: set coordinates, speeds, parameters or inputs",
     "finite": "'{name}' = {value}, expected a finite number",
     "whole": "'{name}' = {value}, expected a whole number",
     "range": "'{name}' = {value} is outside its bounds [{minimum}, {maximum}]",

@@ -57,7 +57,8 @@ static Status method_exists(Why *why, const Variable *v, double value) {
 Status instance_settable(Instance *x, const Variable *v, double value) {
     Why *why = &x->solver.why;
     if (ALGEBRAIC != NULL && v->place == AT_LAMBDA) return ALGEBRAIC->settable(x, v, value);
-    if (v->role == ROLE_OUTPUT) return fail(why, "'%s' is calculated and cannot be set", v->name);
+    if (v->role == ROLE_OUTPUT)
+        return fail(why, "'%s' is calculated and cannot be set: set coordinates, speeds, parameters or inputs", v->name);
     if (x->running && v->role != ROLE_INPUT && !is_same(x, v, value))
         return fail(why, "'%s' can only be set before the end of the initialization", v->name);
     if (v->place == AT_METHOD) return method_exists(why, v, value);
