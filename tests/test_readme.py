@@ -55,6 +55,7 @@ TRIED_ELSEWHERE = (
     "ecospy",
     "SALib",
     "optuna",
+    "gemseo_fmu",
 )  # with FMUs, as printed
 LONG = (
     "tradeoff",
@@ -177,12 +178,12 @@ def test_the_models_hold_at_every_parameter_and_start(tmp_path):
 
 
 def test_the_readme_is_read_in_five_minutes():
-    """Fewer than 1,200 words, each page of docs/ 1,700, and all of them 18,000; every page that it points to
+    """Fewer than 1,200 words, each page of docs/ 1,700, and all of them 18,500; every page that it points to
     is there."""
     assert len(README.split()) < 1200
     words = {page.stem: len(page.read_text(encoding="utf-8").split()) for page in PAGES}
     assert max(words.values()) < 1_700
-    assert sum(words.values()) < 18_000
+    assert sum(words.values()) < 18_500
     for link in re.findall(r"\]\((docs/[\w.]+)\)", README):
         assert (REPOSITORY / link).is_file(), link
 
