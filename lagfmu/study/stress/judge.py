@@ -117,7 +117,7 @@ def magnitudes(facts: Facts, run: Run) -> dict[str, float]:
         found[q] = max(facts.same_unit(q, run.values), rounding)
         peers = [p for p in facts.coordinates if facts.dimensions[p] == facts.dimensions[q]]
         fastest = max(float(np.abs(run.rows[names.derivative(p)]).max()) for p in peers)
-        size = max(found[q], float(np.abs(run.rows[q]).max())) or facts.usual(q)
+        size = max(found[q] or facts.usual(q), float(np.abs(run.rows[q]).max()))
         creep = EPS * (size / min(span, facts.stop_time)) if span > 0 else 0.0
         found[names.derivative(q)] = max(fastest, creep)
         if names.name(names.FORCE, "", q) in facts.variables:
