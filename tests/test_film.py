@@ -122,6 +122,21 @@ def test_a_film_without_a_title_is_a_thumbnail(
     assert out.stat().st_size < 100_000
 
 
+def test_a_path_is_as_round_as_the_run_tells_it(prepared: Callable[[str], Prepared]) -> None:
+    """A particle in the loop, twelve frames of a second: the path that it leaves behind stays within 1 % of
+    the loop, where a straight way from frame to frame would cut the corner by 4 %."""
+    run = simulate(prepared("Loop"), 0.9, 0.005, start_values={"der(x)": 7.1})
+    told = told_by(prepared("Loop"))
+    stage = film.Stage(told.picture, run, {"a": 1.0}, np.linspace(0.0, 0.9, 12), labels=False)
+    (particle,) = (s for s in stage.shapes if s.shape.get("trace"))
+    path = particle.path_to(11)
+    assert np.linalg.norm(path, axis=1) == pytest.approx(1.0, abs=0.01)
+    assert path[-1] == pytest.approx([run["x"][-1], run["y"][-1]], abs=1e-12)
+    assert len(particle.path_to(0)) == 1
+    between = (particle.points[0][1:] + particle.points[0][:-1]) / 2
+    assert np.linalg.norm(between, axis=1).min() < 0.97
+
+
 def test_a_recorded_run_plays_without_the_fmu(
     python_fmu: Fmu, tmp_path: Path, browser: Any
 ) -> None:

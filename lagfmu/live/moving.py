@@ -21,6 +21,7 @@ TOWARDS = np.array(
     ]
 )
 Array = NDArray[np.float64]
+BETWEEN = 8  # points of the path that a shape leaves behind, from frame to frame
 
 
 class Moving:
@@ -52,6 +53,17 @@ class Moving:
         self.force: Array | None = None
         if self.kind == "arrow":
             self.force, self.length = self._point(shape["vector"], look)
+        self.left_behind: Array | None = None
+
+    def leave_behind(self, look: Callable[[str], Any]) -> None:
+        """The path of its centre, if the picture wants it; `look` tells BETWEEN instants a frame."""
+        if self.shape.get("trace"):
+            way = {"kind": "line", "points": [self.shape["center"]]}
+            (self.left_behind,) = Moving(way, look, BETWEEN * (self.frames - 1) + 1).points
+
+    def path_to(self, k: int) -> Array:
+        """What it has left behind at frame k (points, 2)."""
+        return np.empty((0, 2)) if self.left_behind is None else self.left_behind[: BETWEEN * k + 1]
 
     def _hanging(self, ends: Any, length: Array, look: Callable[[str], Any]) -> list[Array]:
         """Points of a string, a parabola that is as long as it, or straight: as web/picture.js has them."""

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from .moving import Array, Moving, in_order
+from .moving import BETWEEN, Array, Moving, in_order
 from .view import View
 
 WIDE, HIGH = 4.2, 3.2  # in, of a sketch at most
@@ -28,15 +29,20 @@ class Stage:
         self.run, self.known, self.times = run, known, times
         told = [s for s in picture["shapes"] if s["kind"] != "direction"]
         self.shapes = [Moving(s, self.look, len(times)) for s in told]
+        all_points = np.arange(BETWEEN * (len(times) - 1) + 1) / BETWEEN
+        fine = np.interp(all_points, np.arange(len(times)), times)
+        for shape in self.shapes:
+            shape.leave_behind(partial(self.look, times=fine))
         self.in_space = picture["dimensions"] == 3
         self.view = View(self.shapes, labels=labels)
 
-    def look(self, name: str) -> Any:
-        """A variable at all frames, or its one value."""
+    def look(self, name: str, times: Array | None = None) -> Any:
+        """A variable at all frames, or at these times, or its one value."""
+        times = self.times if times is None else times
         if name == "time":
-            return self.times
+            return times
         if name in (self.run.dtype.names or ()):
-            return np.interp(self.times, self.run["time"], self.run[name].astype(float))
+            return np.interp(times, self.run["time"], self.run[name].astype(float))
         return self.known.get(name, np.nan)
 
     def draw(self, axes: Any, k: int) -> None:

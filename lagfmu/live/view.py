@@ -80,11 +80,10 @@ class View:
         from matplotlib.patches import Circle
 
         path = np.array([p[k] for p in shape.points])
+        if len(left := shape.path_to(k)):
+            axes.plot(*left.T, color=BOB, lw=0.9, alpha=0.6)
         if shape.facets:
             _solid(axes, shape, k)
-            if shape.shape.get("trace"):
-                center = np.mean([f.mean(axis=1) for f in shape.facets], axis=0)[: k + 1]
-                axes.plot(*shape.seen(list(center.T))[0].T, color=BOB, lw=0.9, alpha=0.6)
         elif shape.kind == "pivot":
             way = np.zeros(2) if shape.axis is None else PIVOT * self.size * shape.axis[k]
             ends = np.array([path[0] - way, path[0] + way])
@@ -108,8 +107,6 @@ class View:
             axes.plot(*path.T, color=INK, lw=1.8)
             axes.plot(*_hatch(path[0], path[1], 0.025 * self.size), color=INK, lw=0.7)
         elif shape.kind == "disk":
-            if shape.shape.get("trace"):
-                axes.plot(*shape.points[0][: k + 1].T, color=BOB, lw=0.9, alpha=0.6)
             if shape.radius is None:
                 axes.plot(*path.T, "o", color=BOB, ms=9)
             else:
