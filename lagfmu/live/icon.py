@@ -17,9 +17,8 @@ from .moving import Moving, in_order
 from .view import View
 
 SIDE, DOTS = 1.28, 100  # in, and dots an inch
-HUNDREDTH = re.compile(
-    rb"(\d+\.\d\d)\d+"
-)  # of a point: further digits of a place are seen by nobody
+# of a point: further digits of a place are seen by nobody
+HUNDREDTH = re.compile(rb"(\d+\.\d\d)\d+")
 FORCES = ("arrow", "direction")  # shapes that are no bodies
 
 
