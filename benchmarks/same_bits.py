@@ -42,7 +42,9 @@ def run(checkout: Path, folder: Path, models: list[str]) -> None:
 
 def main() -> None:
     """Print a line a scene."""
-    other, *models = sys.argv[1:]
+    other, *models = sys.argv[1:] or ["--help"]
+    if not Path(other, "models").is_dir():
+        sys.exit(__doc__)
     with tempfile.TemporaryDirectory() as text:
         ours, theirs = Path(text, "ours"), Path(text, "theirs")
         for checkout, folder in ((ROOT, ours), (Path(other).resolve(), theirs)):

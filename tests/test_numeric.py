@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.sparse import csr_array
 from sympy import cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
@@ -77,8 +78,9 @@ def test_a_block_on_an_incline_sticks_or_slips_for_its_nominals(slope, slip):
 def test_a_light_carrier_hides_no_teeth(inertia):
     """A planetary gear whose ring is held, with Willis' equation besides: i = 3.5 turns of the sun are one of
     the carrier, J carrier'' = i tau with J = J_c + i^2 J_s + k^2 J_p; without J_c that is the limit."""
-    M = np.diag([2e-4, 1e-4, inertia, 5e-3])
-    rows = np.array([[2, 1.5, -3.5, 0], [0, -1.5, -3.5, 5], [2, 0, -7, 5], [0, 0, 0, 1.0]])
+    M = csr_array(np.diag([2e-4, 1e-4, inertia, 5e-3]))
+    teeth = [[2, 1.5, -3.5, 0], [0, -1.5, -3.5, 5], [2, 0, -7, 5], [0, 0, 0, 1.0]]
+    rows = csr_array(np.array(teeth))
     found, _ = solve_at_start(M, np.array([0.5, 0, 0, 0]), rows, np.zeros(4))
     carrier = 3.5 * 0.5 / (inertia + 3.5**2 * 2e-4 + (7 / 3) ** 2 * 1e-4)
     expected = [3.5 * carrier, -7 / 3 * carrier, carrier, 0]
@@ -88,7 +90,8 @@ def test_a_light_carrier_hides_no_teeth(inertia):
 @pytest.mark.parametrize("mass", [1e-12, 1.0, 1e12])
 def test_a_doubled_row_shares_its_force_and_a_contrary_one_is_refused(mass):
     """A weight on two equal supports: m g / 2 each; where they ask for different accelerations, none."""
-    M, b, rows = np.eye(2) * mass, np.array([0.0, -mass * g]), np.array([[0, 1.0], [0, 1.0]])
+    M, b = csr_array(np.eye(2) * mass), np.array([0.0, -mass * g])
+    rows = csr_array(np.array([[0, 1.0], [0, 1.0]]))
     found, lam = solve_at_start(M, b, rows, np.zeros(2))
     assert lam == pytest.approx(mass * g / 2, rel=1e-12)
     assert np.abs(found).max() < 1e-12 * g

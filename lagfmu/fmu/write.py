@@ -231,9 +231,9 @@ def _energy(prepared: Prepared) -> float:
     if system.nv != len(begun.span) or system.dynamics is None:
         return 0.0
     u, p = values_at_start(eom, prepared.whole, eom.numbers)
-    M, *_ = system.assemble(0.0, begun.q, begun.v, [*u, *begun.switch_states], p)
+    M, *_ = system.assemble_sparse(0.0, begun.q, begun.v, [*u, *begun.switch_states], p)
     speeds = np.maximum(begun.span * begun.rate, np.abs(begun.v))
-    return float(np.diag(M) @ speeds**2 / 2)
+    return float(M.diagonal() @ speeds**2 / 2)
 
 
 def write_whole(path: Path, content: bytes) -> None:

@@ -69,10 +69,10 @@ def _wrong(
 ) -> int | None:
     """The contact whose mode contradicts the accelerations most; None if none does."""
     now = motion(at, q, v, at.system.active(modes))
-    felt, whole = now.felt, np.abs(now.F) + np.abs(now.G).T @ np.abs(now.lam)
-    worst, found = -np.inf, None
-    for c, k in enumerate(at.system.contacts):
-        g = np.abs(now.G[k])
+    felt, off = now.felt, now.gamma - now.G @ now.vdot
+    whole = np.abs(now.F) + np.abs(now.G).T @ np.abs(now.lam)
+    worst, found, contacts = -np.inf, None, list(at.system.contacts)
+    for c, (k, g) in enumerate(zip(contacts, np.abs(now.G[contacts]).toarray(), strict=True)):
         if not np.isfinite(square := float(g @ g)):
             raise StepFailureError(
                 f"contact {at.system.rows[k].name!r} has a derivative of {g.max():.3g}, whose square is "
@@ -83,7 +83,7 @@ def _wrong(
             excess = -float(now.lam[k] / alone) if alone else 0.0
             contradicts = excess > -CONTACT_PULL
         else:
-            excess = float(now.gamma[k] - now.G[k] @ now.vdot)
+            excess = float(off[k])
             floor = CONTACT_PULL * (abs(now.gamma[k]) + g @ felt)
             contradicts = touching[c] and excess > floor
         if contradicts and excess > worst:
@@ -96,12 +96,9 @@ def stays_low(
 ) -> list[int]:
     """Of the contacts that part those that would not rise above the gap within which contacts touch,
     v^2 <= 2 a gap: they rest."""
-    now = motion(at, q, v, at.system.active(closed)) if parting else None
-    found = []
-    for c in parting:
-        assert now is not None
-        k = at.system.contacts[c]
-        speed, pull = now.G[k] @ v - now.nu[k], now.gamma[k] - now.G[k] @ now.vdot
-        if pull > 0 and speed**2 <= 2 * pull * gap[c]:
-            found.append(c)
-    return found
+    if not parting:
+        return []
+    now, contacts = motion(at, q, v, at.system.active(closed)), list(at.system.contacts)
+    speed = (now.G @ v - now.nu)[contacts]
+    pull = (now.gamma - now.G @ now.vdot)[contacts]
+    return [c for c in parting if pull[c] > 0 and speed[c] ** 2 <= 2 * pull[c] * gap[c]]

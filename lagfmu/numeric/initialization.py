@@ -19,13 +19,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from .failure import OmittedStartError, StartFailureError, StepFailureError
 from .instant import Instant
 from .linear import solve
 from .nominals import extents, in_speeds, motion_speeds
 from .start_priority import GIVEN, OMITTED, SET
-from .system import NONHOLONOMIC, Matrix, System, Vector
+from .system import NONHOLONOMIC, Sparse, System, Vector
 from .thresholds import (
     INITIAL_ARRIVED,
     INITIAL_ITERATIONS,
@@ -51,13 +52,15 @@ class Stage:
         held = {k for k, j in zip(*system.jacobian, strict=True) if self.free[j]}
         return [i for i, k in enumerate(rows) if k in held]
 
-    def nearest(self, M: Matrix, G: Matrix, c: Vector, off: float = 0.0) -> Vector:
+    def nearest(self, M: Sparse, G: Sparse, c: Vector, off: float = 0.0) -> Vector:
         """dq in speeds (nv), zero where nothing is free, with G dq = c as nearly as can be; `off` as in
         linear.py."""
-        M = np.where(np.outer(self.free, self.free), M, np.diag(M.diagonal()))
-        M = M * self.weight * self.weight[:, None]
-        G = np.where(self.free, G, 0.0)
-        return solve(M, np.zeros(len(M)), G, c, nearest=True, off=off)[0]
+        free, weight, M, G = self.free, self.weight, M.tocoo(), G.tocoo()
+        i, j = M.row, M.col
+        mass = M.data * (free[i] & free[j] | (i == j)) * weight[j] * weight[i]
+        M = csr_array((mass, (i, j)), M.shape)
+        G = csr_array((G.data * free[G.col], (G.row, G.col)), G.shape)
+        return solve(M, np.zeros(len(free)), G, c, nearest=True, off=off)[0]
 
 
 def stages(priority: Sequence[int]) -> Iterator[Stage]:
@@ -161,12 +164,13 @@ def _check_omitted(
     """Raises OmittedStartError where a row cannot be satisfied because none of the omitted coordinates in it
     has a derivative at their 0, though some have one elsewhere: naming these."""
     system, f = at.system, at.residual(q)
-    G = at.equations(q, v)[2]
+    G, held = at.equations(q, v)[2], dict[int, list[int]]()
+    for k, j in zip(*system.jacobian, strict=True):
+        if priority[j] == OMITTED:
+            held.setdefault(k, []).append(j)
     for row in fixed:
-        omitted = [
-            j for k, j in zip(*system.jacobian, strict=True) if k == row and priority[j] == OMITTED
-        ]
-        if f[row] == 0 or G[row, omitted].any():
+        omitted = held.get(row, [])
+        if f[row] == 0 or G[[row]].toarray()[0, omitted].any():
             continue
         names = []
         for j in omitted:

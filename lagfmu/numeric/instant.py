@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .failure import evaluated
-from .system import Matrix, System, Vector
+from .system import Sparse, System, Vector
 
 
 @dataclass(frozen=True)
@@ -21,11 +21,11 @@ class Instant:
     u: Sequence[float]
     p: Sequence[float]
 
-    def equations(self, q: Vector, v: Vector) -> tuple[Matrix, Vector, Matrix, Vector, Vector]:
+    def equations(self, q: Vector, v: Vector) -> tuple[Sparse, Vector, Sparse, Vector, Vector]:
         """M (nv, nv), F (nv), G (m, nv), nu (m), gamma (m).  Raises StepFailureError where they have no
         value."""
-        found: tuple[Matrix, Vector, Matrix, Vector, Vector] = evaluated(
-            "the equations", self.t, self.system.assemble, self.t, q, v, self.u, self.p
+        found: tuple[Sparse, Vector, Sparse, Vector, Vector] = evaluated(
+            "the equations", self.t, self.system.assemble_sparse, self.t, q, v, self.u, self.p
         )
         return found
 

@@ -17,7 +17,7 @@ import numpy as np
 from .failure import MasslessError, StepFailureError
 from .instant import Instant
 from .linear import solve
-from .system import Matrix, Vector
+from .system import Matrix, Sparse, Vector
 from .thresholds import FRICTION_SLACK
 
 Slips = Mapping[int, Vector]  # friction -> e, of those that slip
@@ -30,9 +30,9 @@ ARRIVED = 1e-15  # of the largest multiplier: a change that is rounding
 class Motion:
     """M, F, G, nu, gamma at a state, accelerations (nv) and multipliers (m; 0 for rows that do not act)."""
 
-    M: Matrix
+    M: Sparse
     F: Vector
-    G: Matrix
+    G: Sparse
     nu: Vector
     gamma: Vector
     vdot: Vector

@@ -15,15 +15,17 @@ on springs that balance, what is left of the acceleration is rounding, and sqrt(
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from .failure import StepFailureError
 from .instant import Instant
+from .linear import responses
 from .motion import Motion
-from .system import Matrix, System, Vector
+from .system import Sparse, System, Vector
 from .thresholds import DISPLACED, LOST
 
 Mask = NDArray[np.bool_]
@@ -64,41 +66,35 @@ def sizes(system: System, q: Vector, p: Sequence[float], before: Vector) -> Vect
     return size
 
 
-def motion_speeds(system: System, M: Matrix, speed: Vector) -> Vector:
+def motion_speeds(system: System, M: Sparse, speed: Vector) -> Vector:
     """What speeds (nv) a whole motion has that moves in each at `speed` (nv) >= 0: the largest of its
     dimension; and, across dimensions, with the kinetic energy of the fastest for the heaviest of its own.
 
     A coordinate may rest only because others, which move, hold it: what rounding leaves of its speed is
     rounding of theirs.
     """
-    mass = M.diagonal()
+    mass, own = M.diagonal(), system.speed_dimension
     momentum = (np.sqrt(np.maximum(mass, 0.0)) * speed).max(initial=0.0)
-    shared = np.empty(system.nv)
-    for j in range(system.nv):
-        like = _alike(system, system.speed_dimension[j]) if system.speed_dimension else [j]
-        heaviest = mass[like].max()
-        shared[j] = speed[like].max()
-        if heaviest > 0:
-            shared[j] = max(shared[j], momentum / np.sqrt(heaviest))
-    return shared
+    heaviest, fastest = (_largest_alike(system, x, own) for x in (mass, speed))
+    has = heaviest > 0
+    fastest[has] = np.maximum(fastest[has], momentum / np.sqrt(heaviest[has]))
+    return fastest
 
 
-def _alike(system: System, dimension: int) -> list[int]:
-    """The speeds of that dimension, times a second."""
-    return [i for i, of in enumerate(system.speed_dimension) if of == dimension]
+def _largest_alike(system: System, x: Vector, dimensions: Sequence[int]) -> Vector:
+    """Of each dimension the largest x (nv) among the speeds that have it, times a second; 0 where none."""
+    largest: dict[int, float] = {}
+    for of, value in zip(system.speed_dimension, x.tolist(), strict=True):
+        largest[of] = max(largest.get(of, value), value)
+    return np.array([largest.get(of, 0.0) for of in dimensions])
 
 
 def natural(
-    at: Instant,
-    q: Vector,
-    v: Vector,
-    size: Vector,
-    now: Motion,
-    moving: Callable[[Vector], Motion],
+    at: Instant, q: Vector, v: Vector, size: Vector, now: Motion, rows: Sequence[int]
 ) -> tuple[Vector, float]:
     """Sizes (n) as far as they can be known, from those of places, and the natural rate [1/s]; 0: not known.
 
-    `now` is the motion; moving(q): the one at other positions, with its velocities and modes.
+    `now` is the motion, and `rows` those of the rows that act in it which do not depend on others.
     """
     system, speed, felt, known = at.system, np.abs(v), now.felt, size > 0
     size = size.copy()
@@ -109,11 +105,10 @@ def natural(
     steady = _rate(system, span, speed, felt, sure)
     slowest = min(_rates(system, span, speed, np.zeros(system.nv), span > 0), default=0.0)
     fastest = 0.0  # of the rates by which sizes are taken from the motion
-    for j in np.flatnonzero(~known):
-        like = _alike(system, system.dimension[j]) if system.dimension else [j]
-        if not like:
+    alike = (_largest_alike(system, x, system.dimension) for x in (speed, np.abs(now.vdot), felt))
+    for j, V, A, pull in zip(range(system.nq), *alike, strict=True):
+        if known[j] or system.dimension[j] not in system.speed_dimension:
             continue
-        V, A, pull = speed[like].max(), np.abs(now.vdot[like]).max(), felt[like].max()
         if LOST * pull >= A:
             A = pull  # at rest: what is left is rounding of forces that cancel
         rate = max(steady, pull / V if V > 0 else 0.0)
@@ -122,26 +117,61 @@ def natural(
             rate = max(rate, slowest)
             size[j] = max(V / rate, A / rate / rate)
         fastest = max(fastest, rate)
-    back = _held(q, np.where(known, size, 0.0), now, moving)
     pull = np.abs(now.vdot)
-    if not v.any() and bool((pull <= LOST * np.maximum(felt, back)).all()):  # it rests
-        pull = np.where(back > LOST / DISPLACED * felt, back, 0.0)
+    if not v.any():
+        back = _held(at, q, v, np.where(known, size, 0.0), now, rows)
+        if (pull <= LOST * np.maximum(felt, back)).all():  # it rests
+            pull = np.where(back > LOST / DISPLACED * felt, back, 0.0)
     rate = max(_rate(system, span, speed, pull, span > 0), fastest)
     return size, rate or _rate(system, span, speed, felt, span > 0)
 
 
-def _held(q: Vector, size: Vector, now: Motion, moving: Callable[[Vector], Motion]) -> Vector:
+def _held(
+    at: Instant, q: Vector, v: Vector, size: Vector, now: Motion, rows: Sequence[int]
+) -> Vector:
     """Accelerations (nv) with which a state comes back if each coordinate in turn is displaced by its size,
-    linearly; 0 at the edge of what the equations describe."""
-    back = np.zeros(len(now.vdot))
-    for j in np.flatnonzero(size):
-        moved = q.copy()
-        moved[j] += DISPLACED * size[j]
-        try:
-            back += np.abs(moving(moved).vdot - now.vdot) / DISPLACED
-        except StepFailureError:
-            return np.zeros(len(now.vdot))
+    linearly; 0 at the edge of what the equations describe.
+
+    A displacement leaves r = (F + G^T lambda - M vdot, gamma - G vdot) of the equations, where those are that
+    hold the coordinate; K (dvdot, -dlambda) = r, K the matrix before it.  Frictions push as they did.
+    """
+    system, back = at.system, np.zeros(len(now.vdot))
+    lines = [*range(system.nv), *(system.nv + k for k in rows)]
+
+    def left(place: Vector) -> Vector:
+        M, F, G, _, gamma = at.equations(place, v)
+        return np.concatenate([F + G.T @ now.lam - M @ now.vdot, gamma - G @ now.vdot])
+
+    try:
+        before, changes = left(q), list[tuple[float, int, int]]()
+        for group in _apart(system, np.flatnonzero(size).tolist()):
+            moved = q.copy()
+            moved[group] += DISPLACED * size[group]
+            change = (left(moved) - before) / DISPLACED
+            for j in group:
+                changes += [(change[i], i, j) for i in system.held_by(j)]
+        values, line, place = np.array(changes).reshape(-1, 3).T
+        r = csr_array((values, (line.astype(int), place.astype(int))), (len(before), system.nq))
+        for x in responses(now.M, now.G[rows], r[lines]):
+            back += np.abs(x).sum(axis=1)
+    except StepFailureError:
+        return np.zeros(len(now.vdot))
     return back
+
+
+def _apart(system: System, coordinates: Sequence[int]) -> list[list[int]]:
+    """Groups of coordinates of which no equation holds two."""
+    groups: list[list[int]] = []
+    taken: list[set[int]] = []
+    for j in coordinates:
+        own = system.held_by(j)
+        g = next((g for g, lines in enumerate(taken) if lines.isdisjoint(own)), len(groups))
+        if g == len(groups):
+            groups.append([])
+            taken.append(set())
+        groups[g].append(j)
+        taken[g].update(own)
+    return groups
 
 
 def _rates(system: System, span: Vector, speed: Vector, pull: Vector, counted: Mask) -> list[float]:

@@ -10,8 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .linear import norms, stand_apart
 from .motion import FrictionLaw
-from .system import Matrix, System, Vector
+from .system import Matrix, Sparse, System, Vector
 from .thresholds import RANK
 
 ALONE = 1e-6  # part of a unit vector of multipliers that push nothing, up to which one has no part in it
@@ -30,22 +31,25 @@ class Rank:
 
 
 def rank_of(
-    system: System, G: Matrix, f: Vector, size: Vector, law: FrictionLaw | None = None
+    system: System, G: Sparse, f: Vector, size: Vector, law: FrictionLaw | None = None
 ) -> Rank:
     """Rows are scaled to unit norm; what is left of each beside the span of those before it by Gram and
-    Schmidt, twice.  Contacts come last: one that cannot be closed while those on which it depends are (a wall
-    on either side) is no redundancy.  f (m) are the residuals, `size` (m) the magnitudes of their terms;
-    `law` gives the normal forces of the frictions, if there are any."""
+    Schmidt, twice.  Those of frictions do not count, which hold as long as they stick.  Contacts come last:
+    one that cannot be closed while those on which it depends are (a wall on either side) is no redundancy.
+    f (m) are the residuals, `size` (m) the magnitudes of their terms; `law` gives the normal forces of the
+    frictions, if there are any."""
     C = np.zeros((0, system.m)) if law is None else law.C
-    norm = np.linalg.norm(G, axis=1)
+    norm = norms(G)
     norm = np.where(norm > 0, norm, 1.0)
     G, f, size, C = G / norm[:, None], f / norm, size / norm, C / norm
+    held = [k for k, row in enumerate(system.rows) if row.friction is None]
+    if stand_apart(G.tocsr()[held]):
+        return Rank(len(held), (), (), ())
+    G = G.toarray()
     span = np.zeros((0, system.nv))
     redundant: list[str] = []
     rows: list[int] = []
-    for k in sorted(range(system.m), key=lambda k: k in system.contacts):
-        if system.rows[k].friction is not None:
-            continue  # it holds as long as it sticks
+    for k in sorted(held, key=lambda k: k in system.contacts):
         rest = G[k].copy()
         for _ in range(2):
             rest -= span.T @ (span @ rest)

@@ -21,7 +21,7 @@ from .linear import independent
 from .motion import NONE, motion, stick_slip
 from .nominals import in_speeds, motion_speeds, natural, sizes
 from .start_priority import GIVEN, Moved
-from .system import Matrix, System, Vector
+from .system import Sparse, System, Vector
 from .thresholds import LARGEST_ANGLE, TOUCH
 
 SMALLEST_MASS = float(np.finfo(float).tiny)  # below it a double has fewer digits
@@ -82,7 +82,7 @@ def _start(at: Instant, q0: Vector, v0: Vector, priority: list[int]) -> Start:
         rows, slips = stick_slip(at, q, v, rows, in_speeds(system, at.p, size))
     now = motion(at, q, v, rows, slips)
     held = [rows[i] for i in independent(now.M, now.G[rows])]
-    size, rate = natural(at, q, v, size, now, lambda there: motion(at, there, v, held, slips))
+    size, rate = natural(at, q, v, size, now, held)
     states = tuple(at.u[len(at.u) - len(system.switches) :])
     span = in_speeds(system, at.p, size)
     moved = _moved(system, [*q0, *v0], [*q, *v], [*size, *(span * rate)], priority)
@@ -148,7 +148,8 @@ def _velocities(
     M, _, G, nu, _ = at.equations(q, v)
     fastest = np.maximum(np.maximum(np.abs(v0), np.abs(v)), free)
     unit = np.abs(G) @ motion_speeds(system, M, fastest) + np.abs(nu)
-    missed = [k for k in rows if abs(G[k] @ v - nu[k]) > TOUCH * unit[k]]
+    slip = np.abs(G @ v - nu)
+    missed = [k for k in rows if slip[k] > TOUCH * unit[k]]
     if missed:
         names = ", ".join(repr(system.rows[k].name) for k in missed)
         raise StartFailureError(
@@ -158,7 +159,7 @@ def _velocities(
     return v, shut
 
 
-def _check_masses(at: Instant, q: Vector, v0: Vector, M: Matrix) -> None:
+def _check_masses(at: Instant, q: Vector, v0: Vector, M: Sparse) -> None:
     """Raises StartFailureError for a mass that a double holds to a few digits only, or that is 0 only because
     its factors are too small to multiply.
 

@@ -12,15 +12,17 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from ..names import read
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
+Sparse: TypeAlias = csr_array
 
 HOLONOMIC, NONHOLONOMIC, CONTACT = "holonomic", "nonholonomic", "contact"
 
@@ -100,6 +102,9 @@ class System:
 
     starts(p) -> the start values that are expressions of parameters, at the positions `started` of (q, v).
 
+    `reads`: of each coordinate the equations that hold it, those of the speeds and then (nv + k) of the rows;
+    empty where that is not known.
+
     `estimated` are those of `prescribed` that are followed by a third derivative.  `outputs` are those of
     the model's own.  `energies` is None where they are not read.  The full
     system of an embedding may hold coordinates that are only read: then `dynamics`, `residual` and
@@ -140,6 +145,7 @@ class System:
     driven: int = 0
     started: tuple[int, ...] = ()
     starts: Callable[..., Any] | None = None
+    reads: tuple[tuple[int, ...], ...] = ()
 
     @cached_property
     def nq(self) -> int:
@@ -176,6 +182,10 @@ class System:
         for j, i in zip(*self.rates, strict=True):
             found[i].append(j)
         return tuple(map(tuple, found))
+
+    def held_by(self, j: int) -> Sequence[int]:
+        """The equations that may hold coordinate j, numbered as in `reads`."""
+        return self.reads[j] if self.reads else range(self.nv + self.m)
 
     @cached_property
     def m(self) -> int:
@@ -252,6 +262,19 @@ class System:
         M[j, i] = mass
         G = np.zeros((self.m, self.nv))
         G[self._jacobian] = jacobian
+        return M, np.array(F, dtype=float), G, np.array(nu, dtype=float), np.array(gamma, float)
+
+    def assemble_sparse(
+        self, t: float, q: Vector, v: Vector, u: Sequence[float], p: Sequence[float]
+    ) -> tuple[Sparse, Vector, Sparse, Vector, Vector]:
+        """The same, M and G sparse."""
+        assert self.dynamics is not None
+        mass, F, jacobian, nu, gamma = self.dynamics(t, q.tolist(), v.tolist(), u, p)
+        (i, j), lower = self._mass, np.array(mass, dtype=float)
+        off = i != j
+        places = np.concatenate([i, j[off]]), np.concatenate([j, i[off]])
+        M = csr_array((np.concatenate([lower, lower[off]]), places), (self.nv, self.nv))
+        G = csr_array((np.array(jacobian, float), self._jacobian), (self.m, self.nv))
         return M, np.array(F, dtype=float), G, np.array(nu, dtype=float), np.array(gamma, float)
 
     def rate(

@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import random
 import warnings
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 from typing import Any
 
@@ -21,6 +22,7 @@ from ..errors import CannotStartError, DerivationError, ModelError
 from ..interface.table import variable_table
 from ..interface.variables import VariableTable
 from ..mechanics import prune
+from ..mechanics.coupling import holding
 from ..mechanics.equations import EquationsOfMotion
 from ..mechanics.form import Form
 from ..model.model import Contact, name_of
@@ -34,7 +36,7 @@ from ..numeric.nominals import Mask, in_speeds
 from ..numeric.rank import MISSED, rank_of
 from ..numeric.start import Start, start
 from ..numeric.start_priority import GIVEN
-from ..numeric.system import NONHOLONOMIC, Matrix, System, Vector
+from ..numeric.system import NONHOLONOMIC, Sparse, System, Vector
 from ..numeric.thresholds import RANK
 from .diagnosis import cause_of_failure, negative_energy
 from .starts import priorities
@@ -65,13 +67,19 @@ class Posed:
 
 def posed(value: Lowered) -> Posed:
     """The start in the scene, before anything was left out of the code."""
-    return Posed(value.form.equations, value.whole, value.examined, value.fixed)
+    return Posed(value.form.equations, value.whole, known(value.form, value.examined), value.fixed)
 
 
 def whole(value: Lowered) -> Posed:
     """The start of the model in all its coordinates, every contact free to open."""
     form = Form(value.derived)
-    return Posed(value.derived, variable_table(form, value.scene), lower(form), value.fixed)
+    system = known(form, lower(form))
+    return Posed(value.derived, variable_table(form, value.scene), system, value.fixed)
+
+
+def known(form: Form, system: System) -> System:
+    """The system of a form, with what its symbols tell: which equations hold which coordinate."""
+    return replace(system, reads=holding(form.stepped))
 
 
 def examined_structure(value: Lowered) -> Structure:
@@ -180,10 +188,13 @@ def _spans(system: System, begun: Start, p: Sequence[float]) -> list[float]:
     parts, if it has any. In a chain of 40 bars the places are up to 40 bars from the origin; a tenth of that
     is far."""
     numbers = system.speed_folded or (0.0,) * system.nv
+    parts: dict[int, list[float]] = defaultdict(list)
+    for x, dimension in zip(p, system.extent_dimension, strict=False):
+        parts[dimension] += [abs(x)] if x else []
+    ends = {of: [min(lengths), max(lengths)] for of, lengths in parts.items() if lengths}
     spans = []
     for dimension, number, size in zip(system.speed_dimension, numbers, begun.span, strict=True):
-        part = [i for i, of in enumerate(system.extent_dimension) if of == dimension]
-        lengths = [x for x in (*(abs(p[i]) for i in part), number) if x > 0] or [size or 1e-3]
+        lengths = [x for x in (*ends.get(dimension, ()), number) if x > 0] or [size or 1e-3]
         spans.append(max(min(lengths), 1e-3 * max(lengths)))
     return spans
 
@@ -194,9 +205,10 @@ def _missed(posed: Posed, begun: Start) -> tuple[str, ...]:
     n, rows = system.nq, system.active(begun.closed)
     y = np.array([*begun.q, *begun.v])
     free = np.array([not table[state].given for state in system.states])  # they follow
+    position = {name: i for i, name in enumerate(system.states)}
     for m in begun.moved:
         if m.priority == GIVEN:
-            y[system.states.index(m.name)] = m.given
+            y[position[m.name]] = m.given
     q, v = y[:n], y[n:]
     at = at_start(system, q, u, p)
     _, _, G, nu, _ = at.equations(q, v)
@@ -214,11 +226,14 @@ def _missed(posed: Posed, begun: Start) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _uncured(miss: Vector, G: Matrix, size: Vector, free: Mask) -> Vector:
+def _uncured(miss: Vector, G: Sparse, size: Vector, free: Mask) -> Vector:
     """What is left of a miss (rows) once the free values (n) have followed; 0 for rounding."""
-    follow = np.linalg.lstsq(G[:, free], miss, rcond=RANK)[0] if free.any() else np.zeros(0)
-    left = miss - G[:, free] @ follow
-    return np.where(np.abs(left) > MISSED * (np.abs(G) @ size), left, 0.0)
+    rounding = MISSED * (np.abs(G) @ size)
+    if (np.abs(miss) <= rounding).all():
+        return np.zeros(len(miss))
+    loose = G[:, np.flatnonzero(free)].toarray()
+    left = miss - loose @ np.linalg.lstsq(loose, miss, rcond=RANK)[0]
+    return np.where(np.abs(left) > rounding, left, 0.0)
 
 
 def values_at_start(

@@ -12,7 +12,8 @@ import numpy as np
 from ..numeric.failure import StepFailureError
 from ..numeric.initialization import initial_positions
 from ..numeric.instant import Instant
-from ..numeric.system import Matrix, System, Vector
+from ..numeric.linear import blocks
+from ..numeric.system import Matrix, Sparse, System, Vector
 from ..numeric.thresholds import RANK
 
 NEGATIVE = 1e-12  # a mass below this fraction of its neighbours' is rounding
@@ -28,7 +29,7 @@ def cause_of_failure(at: Instant, q: Vector, v: Vector) -> str | None:
     with np.errstate(all="ignore"):
         try:
             M, F, G, nu, gamma = at.equations(q, v)
-            bad = not all(np.isfinite(a).all() for a in (M, F, G, nu, gamma))
+            bad = not all(np.isfinite(a).all() for a in (M.data, F, G.data, nu, gamma))
             reason = "a value is not finite" if bad else ""
             f = at.residual(q)
         except StepFailureError as error:
@@ -56,7 +57,7 @@ def cause_of_failure(at: Instant, q: Vector, v: Vector) -> str | None:
         if _projected(at, q, v, rows) is None:
             return _missed(at, q, v, rows, f, values)
         for right, what in ((nu, "velocities"), (gamma, "accelerations")):
-            contrary = _first_contrary(system, G, right, rows)
+            contrary = _first_contrary(system, G.toarray(), right, rows)
             if contrary:
                 return (
                     f"constraints {contrary} contradict each other: no {what} satisfy them together at "
@@ -65,7 +66,7 @@ def cause_of_failure(at: Instant, q: Vector, v: Vector) -> str | None:
     return None
 
 
-def negative_energy(system: System, M: Matrix, size: Vector) -> str:
+def negative_energy(system: System, M: Sparse, size: Vector) -> str:
     """Motions with kinetic energy v.M v/2 < 0, in words; empty if M (n, n) is positive semidefinite.
 
     `size` (n) >= 0: the masses' magnitudes here and nearby, which tell a negative mass from the rounding
@@ -84,21 +85,25 @@ def negative_energy(system: System, M: Matrix, size: Vector) -> str:
     ]
     if wrong:
         return f"the kinetic energy is negative: the mass of {', of '.join(wrong)} {remedy}"
-    unit = np.sqrt(np.where(size > 0, size, np.abs(M).max(initial=0.0) or 1.0))
-    values, vectors = np.linalg.eigh(M / unit[:, None] / unit)
-    if not values.min(initial=0.0) < -INDEFINITE:
+    unit = np.sqrt(np.where(size > 0, size, np.abs(M.data).max(initial=0.0) or 1.0))
+    least, moving = -INDEFINITE, ""
+    for rows, block in blocks(M):
+        values, vectors = np.linalg.eigh(block / unit[rows][:, None] / unit[rows])
+        if values[0] < least:
+            names = zip(rows.tolist(), vectors[:, 0].tolist(), strict=True)
+            own = [repr(system.directions[i]) for i, part in names if abs(part) > 1e-2]
+            least, moving = values[0], ", ".join(own)
+    if not moving:
         return ""
-    names = zip(system.directions, vectors[:, 0].tolist(), strict=True)
-    moving = ", ".join(repr(name) for name, part in names if abs(part) > 1e-2)
     return (
         f"the kinetic energy is negative where {moving} move together: the mass matrix, scaled to a "
-        f"diagonal of 1, has the eigenvalue {values[0]:.6g} {remedy}"
+        f"diagonal of 1, has the eigenvalue {least:.6g} {remedy}"
     )
 
 
-def _massless(system: System, M: Matrix, G: Matrix) -> str:
+def _massless(system: System, M: Sparse, G: Sparse) -> str:
     """Names of coordinates that can accelerate without mass and without violating a constraint."""
-    rows = [a / (np.abs(a).max(initial=0.0) or 1.0) for a in (*M, *G)]
+    rows = [a / (np.abs(a).max(initial=0.0) or 1.0) for a in (*M.toarray(), *G.toarray())]
     _, sizes, V = np.linalg.svd(np.array(rows))
     free = V[len(sizes) :].tolist() + V[: len(sizes)][sizes < RANK].tolist()
     loose = sorted({j for direction in free for j, a in enumerate(direction) if abs(a) > 1e-6})
