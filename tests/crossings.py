@@ -124,8 +124,9 @@ def _rheonomic(p: Parts) -> None:
 
 
 def _jump(p: Parts) -> None:
-    # away from its surface: one that holds a motion there is no jump
-    p.push(x, k * d * Heaviside(x - d))
+    p.push(
+        x, k * d * Heaviside(x - d)
+    )  # away from its surface: one that holds a motion there is no jump
 
 
 def _blade(p: Parts) -> None:

@@ -21,8 +21,11 @@ from lagfmu.testing import happened
 
 Fmu = Callable[[str], Path]
 G = 9.81
-# of a ball that falls 1 m and keeps E of its speed
-FALL, SPEED, E = np.sqrt(2 / G), np.sqrt(2 * G), 0.7
+FALL, SPEED, E = (
+    np.sqrt(2 / G),
+    np.sqrt(2 * G),
+    0.7,
+)  # of a ball that falls 1 m and keeps E of its speed
 
 x, z = dynamicsymbols("x z")
 m, g = symbols("m g", positive=True)

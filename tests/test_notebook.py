@@ -1,6 +1,13 @@
-"""What a notebook shows: mathematics of models, tables of results, lambda as a formula."""
+"""What a notebook shows: mathematics of models, tables of results, lambda as a formula; and the texts of
+docs/ that are notebooks."""
 
 from __future__ import annotations
+
+import os
+import re
+import sys
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +20,29 @@ import lagfmu
 from lagfmu import derive
 from lagfmu.errors import DerivationError
 from lagfmu.testing import app, known, load
+
+DOCS = MODELS.parent / "docs"
+LESSONS = sorted((DOCS / "mechanics").glob("*.md"))
+WORDS = {  # what a lesson prints besides equal numbers and True
+    "hemisphere": ["it would slip at 38 degrees"],
+    "hoop": ["critical: 7.004 rad/s"],
+    "incline": [
+        "N N.m",
+        "holonomic | nonholonomic",
+        "nonholonomic: the coefficient of dy ^ dphi ^ dx in d(omega) ^ omega is -1, not 0",
+    ],
+    "ladder": [
+        "0.250 of the weight",
+        "0.250 of the weight",
+        "mu = 0.196: theta ends at 1.200",
+        "mu = 0.192: theta ends at 1.164",
+    ],
+    "pendulum": [],
+    "sphere_in_cylinder": [
+        "nonholonomic: the coefficient of dB ^ dC ^ dphi ^ dz in d(omega_1) ^ omega_1 ^ omega_2 is "
+        "-a*b*sin(B(t)), not 0 (by 20 digits of it at random points); the derived flag has the ranks 2 > 0"
+    ],
+}
 
 
 @pytest.mark.parametrize("name", ["hemisphere", "knife_edge", "rotating_wire"])
@@ -117,3 +147,71 @@ def test_the_models_come_with_the_package():
     done = CliRunner().invoke(app, ["new", "x.py", "--from", "hemispher"])
     assert done.exit_code == 2
     assert "hemisphere" in done.output
+
+
+def run_through(text: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> list[Any]:
+    """What the cells of a text in Markdown give, run in `folder` one after the other."""
+    jupytext = pytest.importorskip("jupytext")
+    nbclient = pytest.importorskip("nbclient")
+    monkeypatch.setenv("JUPYTER_PLATFORM_DIRS", "1")
+    monkeypatch.setenv("PATH", f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}")
+    cells = nbclient.NotebookClient(
+        jupytext.read(text),
+        timeout=300,
+        kernel_name="python3",
+        resources={"metadata": {"path": str(folder)}},
+    ).execute()["cells"]
+    found = [o for c in cells if c["cell_type"] == "code" for o in c["outputs"]]
+    assert [o for o in found if o.get("name") == "stderr"] == []
+    return found
+
+
+def printed(found: list[Any]) -> list[str]:
+    """The lines that Python printed, not the shell."""
+    texts = [o["text"] for o in found if o["output_type"] == "stream" and "wrote" not in o["text"]]
+    return "".join(texts).strip().splitlines()
+
+
+def shown(found: list[Any]) -> set[str]:
+    """Whether figures, mathematics and live pages are shown."""
+    data = [o["data"] for o in found if o["output_type"] in ("execute_result", "display_data")]
+    pages = "".join(d.get("text/html", "") for d in data)
+    figures = {"figure"} if any("image/png" in d for d in data) else set()
+    return figures | {k for k in ("math", "iframe") if f"<{k} " in pages}
+
+
+@pytest.mark.thorough
+def test_the_tutorial_runs_as_a_notebook(tmp_path, monkeypatch):
+    """Cell by cell: lambda = -M g sin(alpha)/3, which the FMU obeys; equations as mathematics, a figure."""
+    found = run_through(DOCS / "tutorial.md", tmp_path, monkeypatch)
+    assert printed(found) == ["-M*g*sin(alpha)/3", "True"]
+    assert shown(found) == {"figure", "math"}
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("lesson", LESSONS, ids=lambda path: path.stem)
+def test_a_lesson_derives_what_the_simulation_does(lesson, tmp_path, monkeypatch):
+    """Where two numbers stand beside each other the first is the simulation's, the second the answer's; what
+    is claimed is True.  There is a page in which the system runs."""
+    found = run_through(lesson, tmp_path, monkeypatch)
+    lines = printed(found)
+    numbers = [line for line in lines if re.fullmatch(r"(-?[\d.]+(e-?\d+)?( |$)){2}", line)]
+    for line in numbers:
+        simulated, derived = map(float, line.split())
+        assert simulated == pytest.approx(derived, rel=1e-5), line
+    claims = [line for line in lines if set(line.split()) <= {"True", "False"}]
+    assert "False" not in " ".join(claims)
+    assert [line for line in lines if line not in numbers + claims] == WORDS[lesson.stem]
+    assert len(numbers) >= 2
+    assert len(numbers + claims) >= 5
+    assert "iframe" in shown(found)
+
+
+@pytest.mark.parametrize("lesson", LESSONS, ids=lambda path: path.stem)
+def test_each_question_of_a_lesson_has_its_answer(lesson):
+    """Numbered, and folded below it."""
+    _, *parts = re.split(r"^\*\*(\d+)\. ", lesson.read_text(encoding="utf-8"), flags=re.MULTILINE)
+    assert [int(k) for k in parts[::2]] == list(range(1, len(parts) // 2 + 1))
+    folded = ['<details markdown="1"><summary>Answer</summary>', "</details>"]
+    assert {tuple(part.count(tag) for tag in folded) for part in parts[1::2]} == {(1, 1)}
+    assert len(parts) >= 12

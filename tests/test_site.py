@@ -37,7 +37,7 @@ def site(shared_folder: Path) -> Path:
         run = subprocess.run(
             command,
             cwd=REPOSITORY,
-            env={**os.environ, "LAGFMU_GALLERY": "hemisphere,belt"},
+            env={**os.environ, "LAGFMU_GALLERY": "hemisphere,hoop"},
             capture_output=True,
             text=True,
             timeout=300,
@@ -50,42 +50,50 @@ def site(shared_folder: Path) -> Path:
 
 def test_the_site_builds_strictly(site: Path) -> None:
     """Every page in the navigation, no broken link, every name of the reference documented; the gallery
-    holds live pages (of two models here), the tutorial is there as a notebook."""
-    assert "lagfmu" in (site / "gallery" / "belt.html").read_text(encoding="utf-8")
+    holds live pages (of two models here), which lessons link, tutorial and lessons are there as notebooks."""
+    assert "lagfmu" in (site / "gallery" / "hoop.html").read_text(encoding="utf-8")
     assert 'href="hemisphere.html"' in (site / "gallery" / "index.html").read_text(encoding="utf-8")
     assert (site / "tutorial.ipynb").is_file()
     assert 'href="../tutorial.ipynb"' in (site / "tutorial" / "index.html").read_text("utf-8")
+    assert (site / "mechanics" / "hoop.ipynb").is_file()
+    assert 'href="../gallery/hoop.html"' in (site / "mechanics" / "index.html").read_text("utf-8")
+    lesson = (site / "mechanics" / "hemisphere" / "index.html").read_text("utf-8")
+    assert 'href="../hemisphere.ipynb"' in lesson
+    assert "<details><summary>Answer</summary>\n<p>" in lesson
 
 
 SHOWN = """() => [...document.querySelectorAll("picture img")].map((e) => [
-    e.currentSrc.split("/").at(-1), e.naturalWidth > 100, new URL(e.closest("a").href).pathname])"""
+    new URL(e.currentSrc).pathname, e.naturalWidth > 100, new URL(e.closest("a").href).pathname])"""
 
 
 @pytest.mark.parametrize("wish", ["no-preference", "reduce"])
 @pytest.mark.parametrize(
-    ("name", "files"), [("", ["landing"]), ("gallery/", ["belt", "hemisphere"])]
+    ("name", "files"),
+    [("", ["hemisphere"]), ("mechanics/", ["hoop"]), ("gallery/", ["hemisphere", "hoop"])],
 )
 def test_mechanisms_move_unless_the_reader_wants_none(
     wish: str, name: str, files: list[str], site: Path, browser: Any
 ) -> None:
-    """The first page and each model of the gallery have a film of many frames, which opens the live page; who
-    asks for less motion has one picture in its place."""
+    """The first page, the lecturer's and each model of the gallery have a film of many frames, which opens
+    the live page; who asks for less motion has one picture in its place."""
     page = Page(browser, site / name / "index.html", reduced_motion=wish)
     page.until("[...document.querySelectorAll('picture img')].every((e) => e.complete)")
     shown = page.tab.evaluate(SHOWN)
     page.close()
-    assert [file.split(".")[0] for file, *_ in shown] == files or wish == "reduce"
+    assert [Path(file).stem for file, *_ in shown] == files
     assert len(shown) == len(files)
     for file, drawn, target in shown:
         assert drawn
         assert Path(target).is_file()
         assert file.endswith(".webp") == (wish != "reduce")
         if wish != "reduce":
-            with Image.open(site / name / file) as film:
+            with Image.open(file) as film:
                 assert film.n_frames > 10
 
 
-@pytest.mark.parametrize("name", ["", "gallery/", "tutorial/", "live/"])
+@pytest.mark.parametrize(
+    "name", ["", "gallery/", "tutorial/", "live/", "mechanics/", "mechanics/hoop/"]
+)
 @pytest.mark.parametrize("theme", ["light", "dark"])
 def test_nothing_of_the_site_keeps_a_reader_out(
     name: str, theme: str, site: Path, browser: Any

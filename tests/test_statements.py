@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import json
+import re
+import shutil
 import zipfile
 from pathlib import Path
 
 import pytest
+from conftest import MODELS
 from typer.testing import CliRunner
 
 import lagfmu
+from lagfmu import Scene
 from lagfmu.errors import SettingError
-from lagfmu.testing import RECORD, app
+from lagfmu.testing import RECORD, app, load
 
 
 @pytest.fixture(scope="module")
@@ -242,3 +246,28 @@ def test_the_file_of_the_documentation_holds(foreign, tmp_path):
     (tmp_path / "claims" / "claims.toml").write_text(text, encoding="utf-8")
     found = lagfmu.verify(foreign, statements=tmp_path / "claims" / "claims.toml")
     assert [c.verdict for c in found.checks[3:]] == ["pass"] * 6
+
+
+def test_what_students_hand_in_is_corrected_by_file(foreign, native_fmu, tmp_path):
+    """What docs/mechanics.md says of the dome, word for word, on FMUs of one name: a particle that cannot
+    leave is pulled from where the other departs, and what has no theta is refused, each told by its file."""
+    page = (Path(__file__).parent.parent / "docs" / "mechanics.md").read_text(encoding="utf-8")
+    (tmp_path / "dome.toml").write_text(page.split("```toml\n")[1].split("```")[0], "utf-8")
+    ann, ben, eve = (tmp_path / f"{name}.fmu" for name in ("ann", "ben", "eve"))
+    shutil.copy(foreign, ann)
+    held = Scene("Hemisphere", stop_time=2.0, contacts=())
+    model = load(MODELS / "hemisphere.py").model
+    shutil.copy(lagfmu.build_fmu(model, tmp_path, held, check=False), ben)
+    shutil.copy(native_fmu("Loop"), eve)
+    words = ["verify", ann, ben, eve, "--statements", tmp_path / "dome.toml"]
+    done = CliRunner().invoke(app, [str(w) for w in words], env={"COLUMNS": "300"})
+    assert done.exit_code == 2
+    verdicts = re.findall(r"(\w+)\.fmu\nHemisphere: (\w+)", done.stdout)
+    assert verdicts == [("ann", "pass"), ("ben", "FAIL")]
+    departs = lagfmu.simulate(foreign)["departure.surface.time"][-1]
+    first = re.search(r"the dome never pulls: first missed at t = (\S+) s", done.stderr)
+    assert 0 <= float(first[1]) - departs <= 0.011  # one communication step
+    assert re.search(rf"error: {re.escape(str(eve))}: .*'theta' is unknown", done.stderr)
+    assert "was not checked" not in done.stdout
+    done = CliRunner().invoke(app, ["verify", str(ben)])
+    assert "carries no closed forms: its physics was not checked" in done.stdout

@@ -432,25 +432,6 @@ def dist(native_fmu, tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
 
 
-def test_the_mass_has_no_part_in_when_the_particle_leaves(dist):
-    """Total Sobol indices by SALib, as docs/sweeps.md has it: the time of the departure is sqrt(a/g) times a
-    function of the angle, the largest force m g cos(theta)."""
-    pytest.importorskip("SALib")
-    names: dict[str, Any] = {}
-    exec(example("SALib"), names)
-    when = names["indices"]["departure.surface.time:last"]
-    force = names["indices"]["lambda.surface:max"]
-    assert when[0] < 1e-12
-    assert when[2] > 0.9 > 0.1 > when[1] > 0.01
-    m, g = (np.array([0.5, 2]), np.array([8, 12]))  # uniform: variance over squared mean
-    part = [(x[1] - x[0]) ** 2 / 12 / x.mean() ** 2 for x in (m, g)]
-    theta = np.linspace(0.1, 0.8, 10001)
-    part.append(np.cos(theta).var() / np.cos(theta).mean() ** 2)
-    total = np.prod(1 + np.array(part)) - 1
-    expected = [p * np.prod([1 + q for q in part if q is not p]) / total for p in part]
-    assert force == pytest.approx(expected, abs=0.05)
-
-
 @pytest.mark.thorough
 def test_an_optimizer_finds_the_damping_at_which_the_spring_just_holds(dist):
     """Optuna, as docs/sweeps.md has it: softer rides better and travels farther, so that the best damping is

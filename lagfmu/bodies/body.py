@@ -11,8 +11,9 @@ from typing import Any
 
 from ..model.elements import Expr, Parameter
 
-# a Parameter, an expression of such, or a number that becomes one
-Number = float | Expr | Parameter
+Number = (
+    float | Expr | Parameter
+)  # a Parameter, an expression of such, or a number that becomes one
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,6 +12,7 @@ from ..fmu.write import write_whole
 from ..page.table import new_table, print_whole
 from ..verification.check import Verification
 from ..verification.junit import Report, as_json, as_junit, exit_code
+from ..verification.verify import OF_THE_FILE
 from .terminal import console, errors, say, say_error
 
 
@@ -23,7 +24,7 @@ def finish(command: str, reports: Sequence[Report], json: Path | None, junit: Pa
         write_whole(junit, as_junit(f"lagfmu {command}", reports))
     for one in reports:
         if one.error:
-            say_error(one.error)
+            say_error(one.error if one.file in one.error else f"{one.file}: {one.error}")
     raise typer.Exit(exit_code(reports))
 
 
@@ -37,7 +38,7 @@ def print_verdicts(found: Verification) -> None:
         colour = {"pass": "green", "FAIL": "bold red"}.get(check.verdict, "yellow")
         table.add_row(escape(row[0]), *row[1:4], f"[{colour}]{row[4]}[/]")
     print_whole(console, table)
-    if not found.closed_forms:
+    if len(found.checks) <= OF_THE_FILE:
         console.print("[yellow]the FMU carries no closed forms: its physics was not checked[/]")
     for check in found.checks:
         if check.failed and check.detail:

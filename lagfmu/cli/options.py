@@ -129,8 +129,11 @@ OPTIONS = {
     "name": Name,
 }  # in the order of --help
 LISTS = ("outputs", "fixed", "inputs", "contacts", "frictions", "methods")
-# an FMU with one of these shows less than the full one
-NARROWING = (*LISTS, "method", "reals_only")
+NARROWING = (
+    *LISTS,
+    "method",
+    "reals_only",
+)  # an FMU with one of these shows less than the full one
 Needs = Mapping[str, Any]
 
 

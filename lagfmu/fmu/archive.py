@@ -45,8 +45,9 @@ def pack(contents: Mapping[str, bytes]) -> bytes:
             info.create_system = 3
             info.external_attr = 0o644 << 16
             info.compress_type = zipfile.ZIP_DEFLATED
-            # that of `archive` is not taken
-            archive.writestr(info, contents[name], compresslevel=9)
+            archive.writestr(
+                info, contents[name], compresslevel=9
+            )  # that of `archive` is not taken
     return buffer.getvalue()
 
 

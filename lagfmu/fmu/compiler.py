@@ -58,8 +58,10 @@ HOT = {  # where the time of a step and of a communication point goes; all else 
 HINTED = "-finline-hint-functions"  # clang: inline what is declared so, not each helper at each of its calls
 
 SHARED = ("-shared", "-s", "-Os")  # -Os is for what the compiler adds of its own
-# Windows cannot do without
-NO_UNWINDING = ("-fno-asynchronous-unwind-tables", "-fno-unwind-tables")
+NO_UNWINDING = (
+    "-fno-asynchronous-unwind-tables",
+    "-fno-unwind-tables",
+)  # Windows cannot do without
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,9 @@ from .moving import Moving, in_order
 from .view import View
 
 SIDE, DOTS = 1.28, 100  # in, and dots an inch
-# of a point: further digits of a place are seen by nobody
-HUNDREDTH = re.compile(rb"(\d+\.\d\d)\d+")
+HUNDREDTH = re.compile(
+    rb"(\d+\.\d\d)\d+"
+)  # of a point: further digits of a place are seen by nobody
 FORCES = ("arrow", "direction")  # shapes that are no bodies
 
 

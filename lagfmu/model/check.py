@@ -25,8 +25,10 @@ from .spline import Spline, splines_in
 from .symbols import known_symbols, symbols_in, undeclared
 from .units import ENERGY, POWER, Unit, check_dimension, declared_unit, parse_unit, plain
 
-# of a prescribed motion: inputs too, or from the communication points
-RATES = ("given", "estimated")
+RATES = (
+    "given",
+    "estimated",
+)  # of a prescribed motion: inputs too, or from the communication points
 
 
 def problems_of(model: ModelFields) -> list[str]:

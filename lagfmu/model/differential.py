@@ -16,8 +16,12 @@ from ..errors import DerivationError
 from .attitude import ClosedFunction
 from .elements import Expr
 
-# their jumps are not differentiated
-CONSTANT_PIECES = (sp.sign, sp.Heaviside, sp.floor, sp.ceiling)
+CONSTANT_PIECES = (
+    sp.sign,
+    sp.Heaviside,
+    sp.floor,
+    sp.ceiling,
+)  # their jumps are not differentiated
 
 
 class Differential:

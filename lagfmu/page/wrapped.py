@@ -7,8 +7,11 @@ from dataclasses import dataclass
 
 from rich.cells import cell_len
 
-# of breaks before operators; between factors or words: 5
-KINDS = {"=≤≥<>≠": 0, "+-−±": 1, "/·∧": 4}
+KINDS = {
+    "=≤≥<>≠": 0,
+    "+-−±": 1,
+    "/·∧": 4,
+}  # of breaks before operators; between factors or words: 5
 OPERATORS = "".join(KINDS)
 OPEN, CLOSE = "([{", ")]}"
 LEVEL = 4.0  # kinds of operators a level

@@ -19,8 +19,9 @@ from .check import Check, Missed
 from .closed_forms import first_miss
 from .evaluate import evaluate
 
-# of the formula of a key, at the points of a statement
-Values = Callable[[str], NDArray[np.float64]]
+Values = Callable[
+    [str], NDArray[np.float64]
+]  # of the formula of a key, at the points of a statement
 
 
 @dataclass(frozen=True)

@@ -26,8 +26,11 @@ from .statements import read_statements
 RECORD = "resources/lagfmu.json"
 MODES = ("Boolean", "Real")  # what a mode may be: a Real where an FMU has Reals alone
 NUMBERS = ("Real", "Integer")
-# where a statement reads them, besides outputs
-RECORDED = ("local", "input", "calculatedParameter")
+RECORDED = (
+    "local",
+    "input",
+    "calculatedParameter",
+)  # where a statement reads them, besides outputs
 OF_THE_FILE = 3  # checks that come before the statements on its physics
 
 

@@ -19,7 +19,7 @@ from ..options import (
     Tolerance,
     assignments,
 )
-from ..terminal import plainly, say_wrote
+from ..terminal import plainly, say, say_wrote
 
 
 def verify(
@@ -87,6 +87,8 @@ def verify(
                 done.append(refused(str(fmu), error))
             else:
                 done.append(report(str(fmu), found))
+                if len(fmus) > 1:  # that may all have one name
+                    say(str(fmu))
                 print_verdicts(found)
         if html is not None:
             page = verified([(r.file, r.found, r.error) for r in done])

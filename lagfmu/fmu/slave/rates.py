@@ -16,8 +16,9 @@ from ...numeric.system import System
 POINTS = 4
 APART = 0.3  # of the way that a motion went: what its rates may miss
 
-# the latest communication points: t, then the value of each motion
-Past = tuple[tuple[float, ...], ...]
+Past = tuple[
+    tuple[float, ...], ...
+]  # the latest communication points: t, then the value of each motion
 
 
 def estimated(

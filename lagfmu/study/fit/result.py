@@ -14,8 +14,10 @@ from .problem import Problem
 
 Floats = NDArray[np.float64]
 TIED = 0.95  # a correlation that is told
-# parts of the chi-squared distribution between which residuals are as expected
-EXPLAINED = (0.01, 0.99)
+EXPLAINED = (
+    0.01,
+    0.99,
+)  # parts of the chi-squared distribution between which residuals are as expected
 
 
 @dataclass(frozen=True)
