@@ -122,6 +122,16 @@ def test_without_a_compiler_a_weight_is_carried_in_python_and_the_remedy_is_name
     assert simulate(tmp_path / "Resting.fmu", 0.1).target == "python"
 
 
+def test_a_model_file_runs_in_its_first_scene_unless_another_is_given(native_fmu):
+    """The pendulum's file in x and y, then in its angle; an FMU is in its scene already."""
+    path = MODELS / "pendulum.py"
+    first, second, *_ = load(path).scenes
+    assert simulate(path, 0.1).name == first.name
+    assert simulate(str(path), 0.1, scene=second).name == second.name
+    with pytest.raises(SettingError, match=r"scene .* is for a model: .* is an FMU"):
+        simulate(native_fmu(first.name), 0.1, scene=second)
+
+
 def test_without_a_compiler_what_slips_is_refused_with_the_remedy(monkeypatch):
     """A block on a belt sticks and slips, which native FMUs alone do: the refusal names the friction, and the
     package that compiles it."""

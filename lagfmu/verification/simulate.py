@@ -38,6 +38,7 @@ from ..fmu.session import (
 from ..fmu.target import PYTHON, target_of
 from ..fmu.write import as_built
 from ..interface.rules import problems_of
+from ..model.file import load
 from ..model.model import Model
 from ..model.rule import Rule
 from ..model.scene import Scene
@@ -69,9 +70,9 @@ def simulate(
 ) -> Result:
     """Outputs at every communication point, as a structured array with the FMU's variable names and units.
 
-    `source` is a Model (in `scene`) or the path of an FMU.  A model runs as `target`: 'native', compiled for
-    this run, or 'python', integrated in this process; without one it is native where a C compiler is at
-    hand, else python, with a warning that names what to install.
+    `source` is a Model (in `scene`), a model file (without `scene` in its first), or the path of an FMU.  A
+    model runs as `target`: 'native', compiled for this run, or 'python', integrated in this process; without
+    one it is native where a C compiler is at hand, else python, with a warning that names what to install.
 
     Times in seconds; `start_values` maps parameters, coordinates, velocities and `solver.*` to values;
     `inputs` is a structured array with 'time' and one field an input, interpolated linearly.  What is left
@@ -89,6 +90,9 @@ def simulate(
             raise SettingError(f"{what} = {number!r} s, expected a positive number")
     if tolerance is not None and (problem := tolerance_problem(tolerance)):
         raise SettingError(problem)
+    if isinstance(source, (str, os.PathLike)) and Path(source).suffix == ".py":
+        file = load(source)
+        source, scene = file.model, scene or file.scenes[0]
     if isinstance(source, Model):
         source = prepare(source, scene)
     asked = _Asked(stop_time, step_size, tolerance, dict(start_values or {}), inputs, besides)
@@ -96,8 +100,10 @@ def simulate(
         if error_bars and not source.asked.error_bars:
             source = prepare(source.model, replace(source.asked, error_bars=True))
         return _of_model(source, target_of(target), asked)
-    if target is not None:
-        raise SettingError(f"target {target!r} is for a model: {str(source)!r} is an FMU already")
+    for what, chosen in (("target", target), ("scene", scene)):
+        if chosen is not None:
+            told = f"{what} {chosen!r} is for a model: {str(source)!r} is an FMU already"
+            raise SettingError(told)
     path = Path(source)
     description = read_description(path)
     if error_bars and not has_error_bars(description.modelVariables):
