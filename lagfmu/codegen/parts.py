@@ -321,6 +321,9 @@ class Parts:
                 "normal": values([c for _, c in normal], [place for place, _ in normal]),
             }
             yield Function("coulomb", text, self.state, results)
+            if self.tangents:
+                text = "Their changes along the direction (dt, dq, dv, du, dp)."
+                yield self._tangent("coulomb_tangent", text, self.state, results)
 
     def _of_outputs(self) -> Iterator[Function]:
         """The model's own outputs."""

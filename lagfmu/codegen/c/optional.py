@@ -26,6 +26,7 @@ DERIVATIVES = (
     "saltation.c",
     "variation.c",
 )  # behind VARIATION
+SLIDING = "sliding_along.c"  # behind OPTIONAL, of both
 BEHIND_BOTH = "extreme.c"
 MOTIONS = ("prescribed.c", "rates.c")  # behind PRESCRIBED of variables.c
 ALGEBRAIC = "algebraic.c"  # behind ALGEBRAIC of variables.c
@@ -86,6 +87,8 @@ def optional_source(
     rows += ["    .passage = &PASSAGE,\n"] if _may_pass(system) else []
     rows += ["    .friction = &FRICTION_EVENTS,\n"] if system.frictions else []
     rows += ["    .variation = &VARIATION,\n"] if scene.sensitivities else []
+    if scene.sensitivities and system.frictions:
+        rows.append("    .sliding_along = sliding_along,\n")
     what = ", ".join(found) + (", contacts" if contacts else "")
     what += ", frictions" if system.frictions else ""
     what += ", error bars" if scene.error_bars else ""
@@ -123,6 +126,8 @@ def files_left_out(
         gone.add("bars.c")  # behind ERROR_BARS of variables.c
     if not scene.sensitivities:
         gone |= {*DERIVATIVES}
+    if not (scene.sensitivities and system.frictions):
+        gone.add(SLIDING)
     if not peaks:
         gone.add(PEAKS)
     if not _may_pass(system):

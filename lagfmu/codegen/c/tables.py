@@ -135,6 +135,8 @@ class Tables:
                 "normal_row": f"{p}normal_row",
                 "coulomb": f"{p}coulomb",
             }
+            if "coulomb_tangent" in functions:
+                fields["coulomb_tangent"] = f"{p}coulomb_tangent"
         lines = "".join(f"    .{name} = {value},\n" for name, value in fields.items())
         return "".join(tables) + f"static const System {p}equations = {{\n{lines}}};\n"
 

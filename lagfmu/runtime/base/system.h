@@ -163,6 +163,9 @@ struct System {
     /* static and kinetic coefficient (2 frictions), load (normal_parts) and c (normal_rows) of the normal forces */
     void (*coulomb)(double t, const double *q, const double *v, const double *u, const double *p,
                     double *coefficients, double *load, double *normal);
+    void (*coulomb_tangent)(double t, const double *q, const double *v, const double *u, const double *p, double dt,
+                            const double *dq, const double *dv, const double *du, const double *dp,
+                            double *dcoefficients, double *dload, double *dnormal);
 };
 
 /* The state that is stepped: y = (q, v), v = y + nq. */

@@ -32,8 +32,8 @@ typedef struct Instance {
     Between between;        /* context: that of tell() */
     Observed seen;          /* what can be read at the state; belongs to it while `observed` is 1 */
     Sensitivity along;      /* of the full system, where there is an embedding */
-    double *own_weight;     /* (outputs of the model's own) of instance_adjoint(), with */
-    Instant at;
+    double *own_weight;     /* (outputs of the model's own) of instance_adjoint() */
+    Instant at;             /* of instance_factor() */
     Settings given;         /* solver.* as they were set; tolerance 0: not set */
     double start_time;            /* [s] of the experiment; its end is solver.stop_time */
     double tolerance;             /* of the experiment; 0: none */
@@ -143,6 +143,11 @@ SHARED void instance_tell_events(Instance *x);
 /* How everything changes along a direction of time, stepped coordinates (nq), speeds (nv) and inputs;
  * then how one variable changes with it.  FAILED: it cannot be said, the cause is in x->solver.why. */
 SHARED Status instance_differentiate(Instance *x, Direction d);
+
+/* The same in two: what all directions at this state need, once, and then along as many as there are. */
+SHARED Status instance_factor(Instance *x);
+SHARED Status instance_differentiate_factored(Instance *x, Direction d);
+
 SHARED Status instance_change(const Instance *x, const Variable *v, Direction d, double *change);
 
 /* The adjoint: of the sum of weighted variables, by their value references.  First one transposed solve for it, then its

@@ -8,12 +8,16 @@
 #include "prescribed.h"
 #include "segment.h"
 
-/* The factors at the state, with which everything is differentiated; *at: there. */
-static Status factor(Instance *x, Instant *at) {
+static Status none_of_outputs(Instance *x) {
+    return fail(&x->solver.why, "this FMU was built for a scene without derivatives of its outputs");
+}
+
+Status instance_factor(Instance *x) {
     Solver *s = &x->solver;
     const System *full = s->system->full;
-    if (s->system->tangent == NULL || s->system->frictions > 0)
-        return fail(&s->why, "this FMU was built for a scene without derivatives of its outputs");
+    Instant *at = &x->at;
+    if (s->system->tangent == NULL || (s->system->frictions > 0 && s->sensitivity.slide == NULL))
+        return none_of_outputs(x);
     if (instance_observe(x) != OK) return FAILED;
     *at = segment_instant(s, s->state.now.t);
     segment_begin(s);
@@ -26,8 +30,9 @@ static Status factor(Instance *x, Instant *at) {
 typedef Status (*Differentiate)(Sensitivity *w, Mechanism *b, Instant at, const double *q, const double *v,
                                 Direction d);
 
-static Status change_all(Instance *x, Instant at, Direction d, Differentiate solve) {
+static Status change_all(Instance *x, Direction d, Differentiate solve) {
     Solver *s = &x->solver;
+    const Instant at = x->at;
     const System *full = s->system->full;
     if (solve(&s->sensitivity, &s->stepped, at, s->state.q, s->state.v, d) != OK) return FAILED;
     if (full == NULL) {
@@ -48,9 +53,10 @@ static Status change_all(Instance *x, Instant at, Direction d, Differentiate sol
     return OK;
 }
 
+Status instance_differentiate_factored(Instance *x, Direction d) { return change_all(x, d, sensitivity_along); }
+
 Status instance_differentiate(Instance *x, Direction d) {
-    Instant at;
-    return factor(x, &at) == OK ? change_all(x, at, d, sensitivity_along) : FAILED;
+    return instance_factor(x) == OK ? instance_differentiate_factored(x, d) : FAILED;
 }
 
 Status instance_change(const Instance *x, const Variable *v, Direction d, double *change) {
@@ -80,6 +86,12 @@ Status instance_change(const Instance *x, const Variable *v, Direction d, double
         case AT_POTENTIAL: *change = w->denergy[1]; break;
         case AT_TOTAL: *change = w->denergy[0] + w->denergy[1]; break;
         case AT_OUTPUT: *change = w->down[v->index]; break;
+        case AT_SLIP: *change = w->dslip[v->index]; break;
+        case AT_MARGIN: *change = w->dmargin[v->index]; break;
+        case AT_POWER: *change = w->dpower[v->index]; break;
+        case AT_LOST_RATE:
+            for (int i = 0; i < s->system->frictions; i++) *change -= w->dpower[i];
+            break;
         case AT_INPUT: *change = d.du[v->index]; break;
         case AT_TIME: *change = d.dt; break;
         case AT_ERROR: case AT_INDICATOR: case AT_SENSITIVITY: *change = NAN; break; /* it is not known, or not asked for */
@@ -141,7 +153,8 @@ Status instance_adjoint(Instance *x, const unsigned unknowns[], const double wei
     const int solved = full != NULL && full->dynamics != NULL;
     Sensitivity *w = full != NULL ? &x->along : &s->sensitivity;
     double *own = x->own_weight;
-    if (factor(x, &x->at) != OK) return FAILED;
+    if (s->sensitivity.slide != NULL) return none_of_outputs(x); /* frictions have no adjoint */
+    if (instance_factor(x) != OK) return FAILED;
     clear_weights(&s->sensitivity, s->system);
     if (full != NULL) clear_weights(w, full);
     memset(own, 0, (size_t)read->output_count * sizeof *own);
@@ -164,7 +177,7 @@ Status instance_gradient(Instance *x, const unsigned unknowns[], const double we
     const System *full = s->system->full;
     double change;
     *undefined = NULL;
-    if (change_all(x, x->at, d, sensitivity_sides) != OK) return FAILED;
+    if (change_all(x, d, sensitivity_sides) != OK) return FAILED;
     *sum = weigh_sides(&s->sensitivity, s->system);
     if (full != NULL && full->dynamics != NULL) *sum += weigh_sides(&x->along, full);
     for (size_t k = 0; k < count; k++) {

@@ -40,8 +40,9 @@ struct FrictionForces {
     double *tangential;  /* (2 frictions) multipliers */
     double *towards;     /* (2 frictions) direction of slip */
     double *reserve;     /* (frictions) mu_s N - |lambda_t| over their sum, of the best lambda */
-    /* scratch: */
-    int *sliding;        /* (frictions) those that slip, whose normal forces are norms last */
+    /* of the latest motion, for sliding_along.c; else scratch: */
+    int *sliding;        /* (frictions) those that slip, whose normal forces are norms last, ... */
+    int slipping;        /* ... and how many these are */
     double *d, *zero, *first, *right; /* (nv), (m), (m), (frictions) */
     double *answer;      /* (frictions nv) accelerations, to each d alone */
     double *pushed;      /* (frictions m) multipliers, to each d alone */

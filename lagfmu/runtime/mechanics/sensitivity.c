@@ -46,6 +46,14 @@ void sensitivity_layout(Sensitivity *w, Arena *arena, const System *s) {
     w->on_c = arena_doubles(arena, s->m);
     w->down = arena_doubles(arena, s->output_count);
     w->dother = arena_doubles(arena, s->output_count);
+    w->slide = NULL;
+    w->dmu = arena_doubles(arena, 2 * s->frictions);
+    w->dpart_load = arena_doubles(arena, s->normal_parts);
+    w->dpart_c = arena_doubles(arena, s->normal_rows);
+    w->dpush = arena_doubles(arena, 2 * s->frictions);
+    w->dslip = arena_doubles(arena, 2 * s->frictions);
+    w->dmargin = arena_doubles(arena, s->frictions);
+    w->dpower = arena_doubles(arena, s->frictions);
 }
 
 static void right_sides(Sensitivity *w, const Mechanism *b) {
@@ -94,7 +102,9 @@ Status sensitivity_along(Sensitivity *w, Mechanism *b, Instant at, const double 
     const System *s = b->system;
     if (sensitivity_sides(w, b, at, q, v, d) != OK) return FAILED;
     if (b->given != NULL) return linear_solve(&b->linear, w->b, w->c, w->dvdot, NULL);
-    if (linear_solve(&b->linear, w->b, w->c, w->dvdot, w->dlambda) == OK) return OK;
+    const Status solved = w->slide != NULL ? w->slide(w, b, at, q, v, d)
+                                           : linear_solve(&b->linear, w->b, w->c, w->dvdot, w->dlambda);
+    if (solved == OK) return OK;
     for (int k = 0; k < s->m; k++)
         if (!b->linear.unique[k])
             return fail(b->why,

@@ -13,7 +13,7 @@ typedef struct {
 } Direction;
 
 /* The changes along it, and the memory that is needed to find them. */
-typedef struct {
+typedef struct Sensitivity {
     double *dM, *dF, *dG, *dnu, *dgamma, *df, denergy[2];
     double *dvdot, *dlambda; /* (nv), (m) */
     double *dB, *drate;      /* (rates), (nq) of q' = B v + b */
@@ -26,6 +26,11 @@ typedef struct {
     double *known;           /* (m) dlambda where it is unique, no numbers elsewhere */
     double *on_vdot, *on_lambda;     /* (nv), (m) weights, and ... */
     double *on_b, *on_c;             /* ... those of b and c that follow from them */
+    /* Of frictions: what `slide` does in the place of one solve, and its memory. */
+    Status (*slide)(struct Sensitivity *w, Mechanism *b, Instant at, const double *q, const double *v, Direction d);
+    double *dmu, *dpart_load, *dpart_c; /* (2 frictions), (normal_parts), (normal_rows) */
+    double *dpush;                      /* (2 frictions) of tangential multipliers, with their normal forces held */
+    double *dslip, *dmargin, *dpower;   /* (2 frictions), (frictions); found where more is asked than a stage needs */
 } Sensitivity;
 
 SHARED void sensitivity_layout(Sensitivity *w, Arena *arena, const System *s);
@@ -34,6 +39,9 @@ SHARED void sensitivity_layout(Sensitivity *w, Arena *arena, const System *s);
  * the latest that was done with `b`. */
 SHARED Status sensitivity_along(Sensitivity *w, Mechanism *b, Instant at, const double *q,
                                 const double *v, Direction d);
+
+/* sliding_along.c: the same with frictions that slip or stick as they do there, from b and c. */
+SHARED Status sliding_along(Sensitivity *w, Mechanism *b, Instant at, const double *q, const double *v, Direction d);
 
 /* The same but dvdot and dlambda, for which nothing is solved: those of the coefficients, and the right sides b, c. */
 SHARED Status sensitivity_sides(Sensitivity *w, Mechanism *b, Instant at, const double *q, const double *v,

@@ -262,7 +262,7 @@ static Status motion_with_friction(Mechanism *b, Instant at, const double *q, co
         if (f->stick_slip[i].sticks) continue;
         friction_heading(&f->stick_slip[i], f->slip + 2 * i, f->towards + 2 * i);
     }
-    const int linear = list_sliding(b, 0, 0), sliding = list_sliding(b, 1, linear);
+    const int linear = list_sliding(b, 0, 0), sliding = f->slipping = list_sliding(b, 1, linear);
     if (check_norms(b, at.t) != OK) return FAILED;
     if (sliding > 0 && solve_sliding(b, at.t, linear, sliding) != OK) return FAILED;
     if (b->stage) return OK;

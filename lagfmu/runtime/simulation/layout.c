@@ -61,6 +61,7 @@ void solver_layout(Solver *s, Arena *saved, Arena *scratch, const System *system
                      OPTIONAL.friction != NULL ? OPTIONAL.friction->sliding : NULL);
     if (s->stepped.friction != NULL) s->stepped.friction->stick_slip = s->state.stick_slip;
     sensitivity_layout(&s->sensitivity, scratch, system);
+    if (system->frictions > 0) s->sensitivity.slide = OPTIONAL.sliding_along;
     s->moves = arena_take(scratch, (size_t)nv, sizeof *s->moves);
     s->active_full = NULL;
     if (system->embed != NULL && system->full->dynamics != NULL) {

@@ -21,4 +21,5 @@ SHARED_VALUE const Optional OPTIONAL = {
     .passage = &PASSAGE,
     .friction = &FRICTION_EVENTS,
     .variation = &VARIATION,
+    .sliding_along = sliding_along,
 };

@@ -44,6 +44,8 @@ typedef struct {
     const FrictionEvents *friction;
     /* Of a run's derivatives; NULL where none are asked for. */
     const Variation *variation;
+    /* Of these with frictions; else NULL. */
+    Status (*sliding_along)(Sensitivity *w, Mechanism *b, Instant at, const double *q, const double *v, Direction d);
 } Optional;
 
 SHARED const Optional OPTIONAL;

@@ -73,14 +73,14 @@ static Status rate_of_state(void *context, double t, const double *y, double *dy
     Solver *s = context;
     const int nq = s->system->nq, nv = s->system->nv;
     if (s->state.now.approach.near && (y = OPTIONAL.passage->stage(s, t, y)) == NULL) return FAILED;
-    s->stepped.stage = s->columns == 0;
-    const Status status = segment_motion(s, segment_instant(s, t), y, y + nq);
+    s->stepped.stage = 1;
+    Status status = segment_motion(s, segment_instant(s, t), y, y + nq);
+    if (status == OK && s->columns > 0) OPTIONAL.variation->rates(s, t, y, dydt + nq + nv);
     s->stepped.stage = 0;
     if (status != OK) return FAILED;
     if (OPTIONAL.passage != NULL) s->narrowest = fmin(s->narrowest, s->apart = linear_apart(&s->stepped.linear));
     find_rates(s, y, dydt);
     for (int i = 0; i < nv; i++) dydt[nq + i] = s->stepped.vdot[i];
-    if (s->columns > 0) OPTIONAL.variation->rates(s, t, y, dydt + nq + nv);
     return OK;
 }
 

@@ -7,18 +7,13 @@
  * step S is moved onto the tangents of the constraints, in the metric of M as the state itself,
  *
  *   f_q S_q + f_p = offset_p ,   G S_v = nu' - G' v        (' along S and p).
- *
- * Where a friction slips its force is differentiated by central differences, all else by the tangents. */
+ */
 #include "variation.h"
 
 #include <math.h>
 
-#include "friction.h"
-#include "nominals.h"
 #include "saltation.h"
 #include "segment.h"
-
-static const double SLIPPING_STEP = 0x1p-17; /* of what y and p are large: cube root of a double's rounding */
 
 /* ------------------------------------------------------------------ rates */
 
@@ -36,56 +31,11 @@ static Status rates_along(Solver *s, Instant at, const double *y, const double *
     return status;
 }
 
-/* Adds weight y' at y + part S, p + part. */
-static Status add_rates(Solver *s, double t, const double *y, const double *S, int parameter, double part,
-                        double weight, double *rates) {
-    const int n = system_states(s->system), nq = s->system->nq;
-    double *there = s->work_friction + 2 * s->system->frictions, *rate = there + n;
-    const double held = parameter < 0 ? 0 : s->p[parameter];
-    for (int j = 0; j < n; j++) there[j] = y[j] + part * S[j];
-    if (parameter >= 0) s->p[parameter] = held + part;
-    s->stepped.stage = 1;
-    const Status status = segment_motion(s, segment_instant(s, t), there, there + nq);
-    s->stepped.stage = 0;
-    if (parameter >= 0) s->p[parameter] = held;
-    if (status != OK) return FAILED;
-    mechanism_rates(&s->stepped, there + nq, rate);
-    memcpy(rate + nq, s->stepped.vdot, (size_t)s->system->nv * sizeof *rate);
-    for (int j = 0; j < n; j++) rates[j] += weight * rate[j];
-    return OK;
-}
-
-static Status rates_by_differences(Solver *s, double t, const double *y, const double *S, int parameter,
-                                   double *rates) {
-    const int n = system_states(s->system);
-    double most = parameter >= 0 ? 1 / (s->p[parameter] != 0 ? fabs(s->p[parameter]) : 1) : 0;
-    memset(rates, 0, (size_t)n * sizeof *rates);
-    for (int j = 0; j < n; j++) {
-        const double size = fmax(fabs(y[j]), nominals_natural(s, j));
-        if (size > 0) most = fmax(most, fabs(S[j]) / size);
-    }
-    if (!(most > 0)) return OK;
-    const double part = SLIPPING_STEP / most;
-    if (add_rates(s, t, y, S, parameter, part, 1 / (2 * part), rates) != OK) return FAILED;
-    return add_rates(s, t, y, S, parameter, -part, -1 / (2 * part), rates);
-}
-
-static int slips(const Solver *s) {
-    int any = 0;
-    for (int i = 0; i < s->system->frictions; i++)
-        any |= s->stepped.friction->loaded[i] && !s->state.stick_slip[i].sticks;
-    return any;
-}
-
 static void variation_rates(Solver *s, double t, const double *y, double *rates) {
-    const int n = system_states(s->system), sliding = slips(s);
-    for (int c = 0; c < s->columns && *s->state.varied; c++) {
-        const double *S = y + n * (1 + c);
-        const int parameter = s->column[c].parameter;
-        const Status status = sliding ? rates_by_differences(s, t, y, S, parameter, rates + n * c)
-                                      : rates_along(s, segment_instant(s, t), y, S, parameter, rates + n * c);
-        if (status != OK) saltation_end(s);
-    }
+    const int n = system_states(s->system);
+    const Instant at = segment_instant(s, t);
+    for (int c = 0; c < s->columns && *s->state.varied; c++)
+        if (rates_along(s, at, y, y + n * (1 + c), s->column[c].parameter, rates + n * c) != OK) saltation_end(s);
     if (!*s->state.varied) memset(rates, 0, (size_t)(n * s->columns) * sizeof *rates);
 }
 
