@@ -50,6 +50,7 @@ FAST = "-O2"
 SMALL = ("-Os", "-Xclang", "-Oz")  # zig takes -Oz for -Os, which clang packs 7 % worse
 HOT = {  # where the time of a step and of a communication point goes; all else is compiled for size
     *("model.c", "mechanism.c", "project.c", "sliding.c", "sensitivity.c"),
+    *("sliding_along.c", "variation.c", "derivatives.c"),
     *("linear.c", "schur.c", "ldlt.c", "lu.c", "painleve.c"),
     *("dop853.c", "rk4.c", "radau5.c", "rattle.c", "integrator.c"),
     *("segment.c", "state.c", "observe.c", "minimum_gap.c", "system.c"),
