@@ -158,7 +158,7 @@ def test_a_page_is_small(name: str, page_file: Callable[[str], Path]) -> None:
     size, text = page_file(name).stat().st_size, page_file(name).read_text(encoding="utf-8")
     in_space = '"dimensions":3' in text
     assert ('id="three"' in text) == ("three.js authors" in text) == in_space
-    most = 500_000 if name == "CrankWithBearingFriction" else 310_000
+    most = 500_000 if name == "CrankWithBearingFriction" else 300_000
     assert size < (1_000_000 if in_space else most)
 
 

@@ -18,10 +18,13 @@ from ..model.rule import MESSAGES, Rule
 from ..model.units import for_reading
 from ..page.preset import SETTABLE
 
-BLANK: dict[str, Any] = {  # what most variables are
-    **dict.fromkeys(("unit", "description", "counted"), ""),
+USUAL: dict[
+    str, Any
+] = {  # of a variable; `reference`: its place.  What is seldom usual comes first
+    **dict.fromkeys(("name", "description", "group", "unit"), ""),
+    **{"discrete": False, "counted": "", "type": "Real", "role": "output", "column": True},
     **dict.fromkeys(("start", "min", "max")),
-    **{"items": [], "discrete": False, "event": False, "type": "Real", "role": "output"},
+    **{"event": False, "items": [], "reference": None},
 }
 NUMBERS = ("Real", "Integer", "Boolean")
 GROUPS = {  # by the kind of what a variable is of
@@ -71,11 +74,16 @@ def facts(
 
 
 def lean(found: dict[str, Any]) -> dict[str, Any]:
-    """The facts as they stand in a page: a variable says only what differs from `blank` (web/api.js)."""
-    told = [
-        {k: x for k, x in v.items() if k not in BLANK or x != BLANK[k]} for v in found["variables"]
-    ]
-    return {**found, "variables": told, "blank": BLANK}
+    """The facts as they stand in a page: a variable is a row beside `usual`, null where it is so, up to
+    the last that is not; its group is a place in `groups` (web/api.js)."""
+    groups, rows = [*dict.fromkeys(v["group"] for v in found["variables"])], []
+    for place, v in enumerate(found["variables"]):
+        told, usual = {**v, "group": groups.index(v["group"])}, {**USUAL, "reference": place}
+        row = [None if told[key] == x else told[key] for key, x in usual.items()]
+        while row[-1] is None:
+            row.pop()
+        rows.append(row)
+    return {**found, "variables": rows, "usual": [*USUAL.items()], "groups": groups}
 
 
 def _variable(v: Any, rule: Rule, named: set[str]) -> dict[str, Any]:

@@ -51,6 +51,8 @@ GROUPS = (
     ("Solver", "Method, accuracy, and what was done."),
     ("Of FMI 3.0 alone", "Time, event indicators, residuals, clocks and arrays."),
 )
+# what MathML knows of a bracket: at the ends of its row it is a fence, which stretches
+BRACKET = re.compile(r'<mo fence="true" form="\w+" stretchy="true">([()\[\]])</mo>')
 AFTER_FACTOR = re.compile(r"(?<=[\w})]) (?=\\(?:a?(?:sin|cos|tan)h?|log|exp|operatorname)\b)")
 TITLES = {  # by the kind of what a variable is of
     "energy": "Energies",
@@ -137,7 +139,8 @@ def page(
 def mathml(latex: str) -> Markup:
     """An equation as the browser shows it."""
     latex = re.sub(r"\\mathrm{([^{}]*)}", lambda m: f"\\text{{{m[1]}}}".replace("\\_", "_"), latex)
-    return Markup(convert(AFTER_FACTOR.sub(r" \\, ", latex), display="block"))
+    formula = convert(AFTER_FACTOR.sub(r" \\, ", latex), display="block")
+    return Markup(BRACKET.sub(r"<mo>\1</mo>", formula))
 
 
 def shown(unit: Unit | None) -> str:

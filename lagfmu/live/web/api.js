@@ -9,7 +9,10 @@
  * rows up to there. */
 
 const FACTS = JSON.parse(document.getElementById("facts").textContent);
-FACTS.variables = FACTS.variables.map((v) => ({ ...FACTS.blank, ...v }));
+FACTS.variables = FACTS.variables.map((row, place) => {
+  const v = Object.fromEntries(FACTS.usual.map(([key, usual], k) => [key, row[k] ?? usual]));
+  return { ...v, reference: v.reference ?? place, group: FACTS.groups[v.group] };
+});
 
 /* What a script element holds, packed. */
 async function inflated(box) {
