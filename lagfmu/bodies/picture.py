@@ -110,8 +110,9 @@ def _value(draft: Draft, expression: Any) -> float | None:
     """With the parameters' own values; None for what is no number then."""
     if isinstance(expression, Parameter):
         return float(expression.value)
-    values = {symbol: sp.sympify(p.value) for symbol, p in draft.parameters.items()}
-    found = sp.sympify(expression).xreplace(values)
+    found = sp.sympify(expression)
+    known = found.free_symbols & draft.parameters.keys()
+    found = found.xreplace({s: sp.sympify(draft.parameters[s].value) for s in known})
     return float(found) if found.is_number else None
 
 

@@ -263,12 +263,18 @@ class EquationsOfMotion(Displayed):
 
     def folded(self, unit: Unit) -> float:
         """The largest magnitude of that dimension among the parameters that became numbers."""
-        values = [
-            abs(float(self.numbers[p.symbol]))
-            for p in self.model.parameters
-            if p.symbol in self.numbers and self.model.units[p.symbol].same_dimension(unit)
-        ]
-        return 0.0 if unit.dimensionless else max(values, default=0.0)
+        return 0.0 if unit.dimensionless else self._folded.get(unit.exponents, 0.0)
+
+    @cached_property
+    def _folded(self) -> dict[object, float]:
+        """The same, of each dimension."""
+        found: dict[object, float] = {}
+        for p in self.model.parameters:
+            if p.symbol in self.numbers:
+                dimension = self.model.units[p.symbol].exponents
+                size = abs(float(self.numbers[p.symbol]))
+                found[dimension] = max(found.get(dimension, 0.0), size)
+        return found
 
     def mapped(self, change: Callable[[Expr], Expr]) -> EquationsOfMotion:
         """The same with `change` done to every expression of the equations and energies."""

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import sympy as sp
 
-from .elements import ModelFields, name_of
+from .elements import Expr, ModelFields, name_of
 from .picture import (
     PIVOTS,
     SHAPES,
@@ -25,12 +25,14 @@ from .symbols import known_symbols, symbols_in
 
 def check_picture(model: ModelFields, problems: list[str]) -> None:
     """Add what is wrong with it to `problems`."""
+    extra = model.embedding.coordinates if model.embedding else {}
+    known, own = known_symbols(model) | set(extra), {o.name for o in model.outputs}
     sizes = set()
     for number, shape in enumerate(model.picture, 1):
         what = f"picture, shape {number}"
         if not isinstance(shape, SHAPES):
-            known = ", ".join(s.__name__ for s in SHAPES)
-            problems.append(f"{what} is {shape!r}, expected one of {known}")
+            kinds = ", ".join(s.__name__ for s in SHAPES)
+            problems.append(f"{what} is {shape!r}, expected one of {kinds}")
             continue
         what += f" ({type(shape).__name__})"
         wrong = [p for p in points_of(shape) if not _is_point(p)]
@@ -62,7 +64,7 @@ def check_picture(model: ModelFields, problems: list[str]) -> None:
             )
         problems += [
             f"{what}: {name} is neither coordinate, parameter nor input: declare it, or use output(name)"
-            for name in sorted(set(_unknown(model, shape)))
+            for name in sorted(set(_unknown(known, own, shape)))
         ]
     if len(sizes) > 1:
         problems.append(
@@ -89,22 +91,20 @@ def _is_rotation(shape: Box | Frame) -> bool:
 
 
 def _check_arrow(model: ModelFields, arrow: Arrow, what: str, problems: list[str]) -> None:
+    if arrow.force is not None:
+        return
     known = [c.name for c in model.constraints if hasattr(c, "expression")]
-    if arrow.constraint not in known and arrow.force is None:
+    if arrow.constraint not in known:
         problems.append(
             f"{what}: no constraint is called {arrow.constraint!r}, expected one of "
             f"{', '.join(known) or 'none: the model has no constraint'}"
         )
 
 
-def _unknown(model: ModelFields, shape: Shape) -> Iterator[str]:
-    """Names that are none of the model's; those with a dot are outputs."""
-    extra = model.embedding.coordinates if model.embedding else {}
-    known = known_symbols(model) | set(extra)
-    own = {o.name for o in model.outputs}
-    if isinstance(shape, Track):
-        known.add(shape.over)
+def _unknown(known: set[Expr], own: set[str], shape: Shape) -> Iterator[str]:
+    """Names that are none of the model's symbols, nor of its outputs; those with a dot are outputs too."""
+    over = {shape.over} if isinstance(shape, Track) else set()
     for expression in expressions_of(shape):
-        for symbol in symbols_in(expression):
-            if symbol not in known and "." not in str(symbol) and str(symbol) not in own:
+        for symbol in symbols_in(expression) - known - over:
+            if "." not in str(symbol) and str(symbol) not in own:
                 yield name_of(symbol)

@@ -4,8 +4,6 @@ than one component.  Each is named with what to write instead.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 import sympy as sp
 from sympy.physics.vector import dynamicsymbols
 from sympy.physics.vector.dyadic import Dyadic
@@ -45,12 +43,13 @@ def unusable(what: str, expression: Expr) -> list[str]:
 def unusable_surfaces(model: ModelFields) -> list[str]:
     """Functions f of constraints that lack a second derivative, or whose gradient vanishes with them."""
     problems = []
-    moving = (*model.coordinates, dynamicsymbols._t, *(i.symbol for i in model.inputs))
+    changing = (*model.coordinates, *(i.symbol for i in model.inputs))
+    moving = {dynamicsymbols._t}.union(*(s.free_symbols for s in changing))
     for c in model.constraints:
         if not isinstance(c, (Holonomic, Contact)):
             continue
         f = sp.sympify(c.expression)
-        kinks = [k for k in f.atoms(*KINKED) if k.has(*moving)]
+        kinks = [k for k in f.atoms(*KINKED) if k.free_symbols & moving]
         if kinks:
             problems.append(
                 f"constraint {c.name!r}: {', '.join(sorted(map(plain, kinks)))} has a kink or a jump, but f "
@@ -65,8 +64,8 @@ def unusable_surfaces(model: ModelFields) -> list[str]:
     return problems
 
 
-def _is_squared(f: Expr, moving: Iterable[Expr]) -> bool:
+def _is_squared(f: Expr, moving: set[Expr]) -> bool:
     """A product, of the factors of which that vanish each is a square or a higher power."""
-    factors = [a for a in sp.Mul.make_args(sp.factor_terms(f)) if a.has(*moving)]
+    factors = [a for a in sp.Mul.make_args(sp.factor_terms(f)) if a.free_symbols & moving]
     powers = [a.as_base_exp()[1] for a in factors]
     return bool(powers) and all(p.is_number and p.is_positive and p > 1 for p in powers)

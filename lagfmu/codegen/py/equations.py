@@ -18,6 +18,8 @@ from ..parts import Function, Parts, parts_of
 from .function import function, identifiers, table_name
 from .loops import in_loops
 
+OBSERVED = ("t", "q", "v", "vdot", "u", "p", "lam", "Q")  # what outputs are functions of
+
 
 def source(form: Form) -> str:
     """Python text that defines SYSTEM, the numeric form of the equations.
@@ -170,7 +172,7 @@ def _outputs(parts: Parts) -> dict[str, str]:
         if f.name != "outputs":
             continue
         given = {**f.arguments, "lam": f.arguments["lambda"]}
-        arguments = {a: given[a] for a in ("t", "q", "v", "vdot", "u", "p", "lam", "Q")}
+        place = {s: (a, k) for a in OBSERVED for k, s in enumerate(given[a])}
         for k, o in enumerate(eom.outputs):
             w, other = f.results["w"][k], f.results["other"][k]
             made = {f"output_{k}": (f"{w.place}.", w)}
@@ -178,10 +180,21 @@ def _outputs(parts: Parts) -> dict[str, str]:
                 made[f"otherwise_{k}"] = (f"{o.name} where it has no value.", other)
             said = [repr(o.name), *made, *(["unique=True"] if o.unique else [])]
             found[f"Own({', '.join(said)})"] = "\n\n".join(
-                _define(Function(name, doc, arguments, {"w": [x]}), names)
-                for name, (doc, x) in made.items()
+                _output(name, doc, x.expression, place, names) for name, (doc, x) in made.items()
             )
     return found
+
+
+def _output(
+    name: str, doc: str, value: Expr, place: Mapping[Expr, tuple[str, int]], names: dict[Expr, str]
+) -> str:
+    """A function of one value, which reads few of its many arguments."""
+    arguments: dict[str, dict[int, Expr]] = {a: {} for a in OBSERVED}
+    for s in sorted(value.free_symbols, key=place.__getitem__):
+        argument, k = place[s]
+        arguments[argument][k] = s
+    used = {s: names[s] for s in value.free_symbols}
+    return function(name, doc, arguments, {"w": [value]}, used)
 
 
 def _rows(parts: Parts) -> str:

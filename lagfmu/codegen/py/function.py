@@ -86,14 +86,14 @@ def identifiers(symbols: Sequence[Expr]) -> dict[Expr, str]:
 def function(
     name: str,
     doc: str,
-    arguments: Mapping[str, Sequence[Expr]],
+    arguments: Mapping[str, Sequence[Expr] | Mapping[int, Expr]],
     results: Mapping[str, Sequence[Expr]],
     names: Mapping[Expr, str],
 ) -> str:
     """Source of `name(*arguments)` that returns a tuple of the lists in `results`.
 
-    `arguments` maps an argument to the symbols it is unpacked into, one that is passed as it is to the one
-    symbol that has its name.
+    `arguments` maps an argument to the symbols it is unpacked into, or to those that are read of it by their
+    places; one that is passed as it is to the one symbol that has its name.
     """
     flat = [sp.sympify(e) for group in results.values() for e in group]
     used = set().union(*(e.free_symbols for e in flat)) if flat else set()
@@ -104,6 +104,10 @@ def function(
     common, reduced = sp.cse(flat, symbols=_fresh(taken), order="none", list=True)
     lines = [f"def {name}({', '.join(arguments)}):", f'    """{doc}"""']
     for argument, symbols in arguments.items():
+        if isinstance(symbols, Mapping):
+            read = ((names[s], k) for k, s in symbols.items() if names[s] != argument)
+            lines += [f"    {name} = {argument}[{k}]" for name, k in read]
+            continue
         if [names[s] for s in symbols] == [argument]:
             continue
         wanted = [names[s] if s in used else "_" for s in symbols]
