@@ -36,7 +36,8 @@ EMPTY_HEAD = re.compile(r"<thead>\s*<tr>(?:\s*<th[^>]*></th>)+\s*</tr>\s*</thead
 EMPTY_HEADING = re.compile(r"<th[^>]*></th>")
 FIGURE = r"!\[([^\]]+)\]\((NAME\.\w+)\)"
 NOTEBOOK = (
-    '`jupytext --to ipynb docs/tutorial.md` makes a notebook of it (`pip install -e ".[docs]"`)'
+    "`jupytext --set-kernel python3 --to ipynb docs/tutorial.md` makes a notebook of it "
+    '(`pip install -e ".[docs]"`)'
 )
 
 
@@ -124,7 +125,9 @@ def _moving(film: str, still: str, text: str) -> str:
 
 def notebook(text: str) -> str:
     """A text in Markdown as a notebook: its blocks of Python become cells."""
-    return str(jupytext.writes(jupytext.reads(text, fmt="md"), fmt="ipynb"))
+    cells = jupytext.reads(text, fmt="md")
+    cells.metadata["kernelspec"] = {"name": "python3", "display_name": "Python 3"}
+    return str(jupytext.writes(cells, fmt="ipynb"))
 
 
 def _models() -> list[Path]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 from conftest import MODELS
 from typer.testing import CliRunner
@@ -51,12 +52,18 @@ def _model() -> lagfmu.Model:
 
 def test_the_figures_of_the_page_are_those_of_the_commands(printed, tmp_path):
     """The outputs of the FMU, the largest forces of the plot, and what a kilogram takes from the bearing."""
-    assert "1 " in printed("show")
-    printed("build")
+    assert "N = n - rank G = 9 - 8 = 1" in printed("show")
+    lacks = "12 of 13 closed forms were not checked: this FMU leaves out what they need"
+    assert lacks in " ".join(printed("build").split())
     fmu = tmp_path / "dist" / "native" / "SliderCrankBodies.fmu"
-    run = lagfmu.simulate(fmu)
+    run = lagfmu.simulate(fmu, step_size=0.001)
     assert set(run.dtype.names) >= {"force.A.norm", "force.B.norm", "torque.D.z", "angle.A"}
-    assert run["force.A.norm"].max() == pytest.approx(169, rel=5e-3)
+    force, turns = run["force.A.norm"], run["angle.A"] / (2 * np.pi)
+    tops = (
+        np.flatnonzero((force[1:-1] > np.maximum(force[:-2], force[2:])) & (force[1:-1] > 50)) + 1
+    )
+    assert force[tops] == pytest.approx([141, 169] * 4, rel=5e-3)
+    assert np.diff(turns[tops[1::2]]) == pytest.approx(1.0, abs=0.02)
     assert run["force.B.norm"].max() == pytest.approx(110, rel=1e-2)
     text = printed("sensitivity")
     table = re.findall(r"(\w+\.mass) +([+-][\d.]+) +([\d.]+)", text)
