@@ -11,6 +11,7 @@ from sympy import cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Contact, Friction, Input, Model, Nonholonomic, Parameter, multiplier
+from lagfmu.bodies import Body, Gravity, Ground, Motor, Prismatic, Revolute, mechanism
 
 g = 9.81  # m/s^2
 
@@ -166,6 +167,32 @@ def test_what_rests_has_no_natural_time(method, built):
         one.step(0.11)
         assert one.get("slipping.grip.time") == pytest.approx(0.2924, abs=1e-13)
         assert one.get("der(x)") == pytest.approx(5 * 0.0276**2, abs=1e-12)
+
+
+def test_a_wedge_that_nothing_turns_has_no_scale_of_its_turning(built):
+    """A wedge of 0.2 rad under 51 kg in an upright guide, all faces rough, no lever arm anywhere: torques are
+    rounding, and no time is one of them.  Drawn out with 1200 N/s it holds up to its limit, and then slides
+    in tens of steps."""
+    base, shoe, load = (Body(n, m, 0.01) for n, m in (("base", 3.0), ("shoe", 1.0), ("load", 50.0)))
+    floor, face, guide, slope = 0.2, 0.25, 0.1, 0.2
+    joints = [
+        Prismatic("floor", Ground().at((0, 0)), base.at((0, 0)), friction=floor),
+        Prismatic("face", base.at((0, 0), slope), shoe.at((0, 0), slope), friction=face),
+        Revolute("pin", shoe.at((0, 0)), load.at((0, 0))),
+        Prismatic("guide", Ground().at((0, 0)), load.at((0, 0)), axis="y", friction=guide),
+    ]
+    loads = [Gravity((0, -g)), Motor("pull", "floor")]
+    model = mechanism("Wedge", plane="xy", bodies=[base, shoe, load], joints=joints, loads=loads)
+    push = face * math.cos(slope) - math.sin(slope), math.cos(slope) + face * math.sin(slope)
+    N = 51 * g / (push[1] + guide * push[0])
+    limit = floor * (3 * g + N * push[1]) + N * push[0]
+    with instance(built(model)) as one:
+        one.start()
+        one.step(0.001)
+        one.fmu.setRealInputDerivatives([one.variables["pull.force"].valueReference], [1], [1200.0])
+        one.step(0.2)
+        assert one.get("slipping.floor.time") == pytest.approx(0.001 + limit / 1200, rel=1e-9)
+        assert one.get("solver.steps") < 100
 
 
 def test_headway_is_judged_by_the_motion_as_it_is(built):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import unicodedata
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from typer.testing import CliRunner
 
 import lagfmu
 from lagfmu import ClosedForm, Conserved, Result, Scene, output
+from lagfmu.bodies import Body, Ground, Revolute, Rolling, mechanism
 from lagfmu.testing import app, applies, carried, check_closed_form, console, load, moments, wrapped
 
 
@@ -184,6 +186,22 @@ def test_show_prints_coulombs_law() -> None:
     assert "grip slips    λ_rest = -μ_k |λ_floor| ẋ/|ẋ|" in shown
     shown = CliRunner().invoke(app, ["show", str(MODELS / "bowling.py")]).output
     assert "grip slips    λ_touch = -μ |λ_lane| (ẋ - R φ̇)/|ẋ - R φ̇|" in shown
+
+
+def test_what_joints_let_go_is_told_without_an_elimination(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A rubbing hinge between two bodies in space and a ball that rolls: rows on velocities, whose slip is
+    told by the FMU's name.  Whether they are integrable on thirteen surfaces would take minutes."""
+    monkeypatch.setattr("lagfmu.page.text.classify", None)
+    one, two, ball = (Body(name, 1.0, (0.1, 0.1, 0.1)) for name in ("one", "two", "ball"))
+    joints = [
+        Revolute("A", Ground().at((0, 0, 0)), one.at((0, 0, 0)), axis="y"),
+        Revolute("B", one.at((1, 0, 0)), two.at((0, 0, 0)), axis="y", friction=0.1, radius=0.01),
+        Rolling("R", one.at((0, 0, 0)), ball.at((0, 0, 0)), radius=0.1),
+    ]
+    told = str(lagfmu.show(mechanism("Arms", bodies=[one, two, ball], joints=joints)))
+    assert re.search(r"B\.ry +on velocities: B does not turn\n", told)
+    assert re.search(r"R\.x +on velocities: R rolls without slipping\n", told)
+    assert "slip.B.ry/|slip.B.ry|" in told
 
 
 def test_show_refuses_a_start_that_build_refuses(tmp_path: Path) -> None:

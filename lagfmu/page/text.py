@@ -139,8 +139,12 @@ def _classes(eom: EquationsOfMotion, console: Console) -> None:
     for c, f in zip(eom.constraints, eom.f, strict=True):
         closed = getattr(c, "while_closed", None)
         note = f", while {closed} is closed" if closed is not None else ""
+        if isinstance(c, Nonholonomic) and _of_parts(eom, c):
+            text = f"on velocities: {c.description}" if c.description else "on velocities"
+            _line(console, f"{c.name:{width}}", text + note)
+            continue
         if isinstance(c, Nonholonomic):
-            forms[c.name] = sp.sympify(c.expression)
+            forms[c.name] = c
             found = _classified(eom, [c])
             _class(eom, console, f"{c.name:{width}}", found, note)
             continue
@@ -151,9 +155,14 @@ def _classes(eom: EquationsOfMotion, console: Console) -> None:
             kind += ", rheonomic"
         _line(console, f"{c.name:{width}}", kind + note)
     if len(forms) > 1:
-        rolling = [c for c in eom.constraints if isinstance(c, Nonholonomic)]
-        found = _classified(eom, rolling)
+        found = _classified(eom, list(forms.values()))
         _class(eom, console, " and ".join(forms), found, "")
+
+
+def _of_parts(eom: EquationsOfMotion, c: Nonholonomic) -> bool:
+    """It is of a mechanism's joints, whose many rows are no surface to eliminate with, or in speeds that are
+    no rates of coordinates: no one-form as it stands."""
+    return bool(eom.model.parts) or sp.sympify(c.expression).has(*(eom.model.speeds or ()))
 
 
 def _classified(eom: EquationsOfMotion, forms: list[Nonholonomic]) -> Classification:

@@ -29,7 +29,8 @@ from ..model.elements import Expr, name_of
 from ..model.model import Contact, Nonholonomic
 from ..model.reactions import multiplier
 from ..model.units import SUPERSCRIPT
-from ..names import derivative, rate_of, read
+from ..names import SLIP, derivative, rate_of, read
+from ..names import name as name_of_variable
 
 Printed = tuple[str, str]  # LaTeX, text
 MOST = 24  # equations of a kind that are printed
@@ -337,28 +338,32 @@ class _Typesetter:
         show, factor = self.notation.show, self.notation.factor
         rows = {c.name: k for k, c in enumerate(self.eom.constraints)}
 
-        def vector(expressions: Sequence[Expr]) -> Printed:
+        def slip(row: str) -> Printed:
+            """Of a mechanism's joint as the FMU calls it: in the speeds of bodies it would fill lines."""
+            if self.eom.model.parts:
+                return f"s_{{{_letter(row)}}}", name_of_variable(SLIP, row)
+            k = rows[row]
+            moved = sp.Add(*(self.eom.G[k, j] * v for j, v in enumerate(self.eom.v)))
+            return show(_tidy(moved - self.eom.nu[k]))
+
+        def vector(components: Sequence[Printed]) -> Printed:
             """In brackets, if it has several components."""
-            latex, text = (", ".join(parts) for parts in zip(*map(show, expressions), strict=True))
-            several = len(expressions) > 1
+            latex, text = (", ".join(parts) for parts in zip(*components, strict=True))
+            several = len(components) > 1
             return _put("\\left({}\\right)", "({})", (latex, text)) if several else (latex, text)
 
         equations: list[tuple[str, Sequence[Printed]]] = []
         for law in self.eom.frictions:
             size = _magnitude(show(law.normal)) if len(law.parts) == 1 else factor(law.normal)
-            force = vector([multiplier(k) for k in law.of])
-            slip = [
-                sp.Add(*(self.eom.G[k, j] * v for j, v in enumerate(self.eom.v))) - self.eom.nu[k]
-                for k in map(rows.__getitem__, law.of)
-            ]
-            speed = vector([_tidy(s) for s in slip])
-            s = ("s", "s") if len(slip) > 1 else speed
+            force = vector([show(multiplier(row)) for row in law.of])
+            speed = vector([slip(row) for row in law.of])
+            s = ("s", "s") if len(law.of) > 1 else speed
             stick = [_magnitude(force), ("\\le", "≤"), factor(law.static), size]
             equations.append((f"{law.name} sticks", stick))
             text = "({0})/|{0}|" if " " in s[1] else "{0}/|{0}|"
             sign = _put("\\frac{{{0}}}{{\\left|{0}\\right|}}", text, s)
             slide = [force, ("=", "="), _put("-{}", "-{}", factor(law.kinetic)), size, sign]
-            if len(slip) > 1:
+            if len(law.of) > 1:
                 slide += [("\\text{with } s =", "with s ="), speed]
             equations.append((f"{law.name} slips", slide))
         remark = (

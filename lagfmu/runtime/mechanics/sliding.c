@@ -14,6 +14,7 @@
 #include <string.h>
 
 #include "digits.h"
+#include "thresholds.h"
 
 static const double FRICTION_HELD = 1e-12; /* of the acceleration that a push gives without constraints: none */
 static const double FRICTION_STILL = 1e-9; /* of the accelerations at work: a slip that does not change */
@@ -246,6 +247,17 @@ static int list_sliding(Mechanism *b, int norms, int count) {
     return count;
 }
 
+/* At rest, what rounding leaves of forces that hold each other moves nothing. */
+static void rest(Mechanism *b, const double *v) {
+    const int nv = b->system->nv;
+    for (int j = 0; j < nv; j++)
+        if (v[j] != 0) return;
+    mechanism_at_work(b, b->place, b->reach);
+    for (int j = 0; j < nv; j++)
+        if (!(fabs(b->vdot[j]) <= LOST * b->reach[j])) return;
+    memset(b->vdot, 0, (size_t)nv * sizeof *b->vdot);
+}
+
 static Status motion_with_friction(Mechanism *b, Instant at, const double *q, const double *v,
                                    const int *active) {
     const System *s = b->system;
@@ -265,6 +277,7 @@ static Status motion_with_friction(Mechanism *b, Instant at, const double *q, co
     const int linear = list_sliding(b, 0, 0), sliding = f->slipping = list_sliding(b, 1, linear);
     if (check_norms(b, at.t) != OK) return FAILED;
     if (sliding > 0 && solve_sliding(b, at.t, linear, sliding) != OK) return FAILED;
+    rest(b, v);
     if (b->stage) return OK;
     if (sticking) find_reserves(b);
     for (int i = 0; i < s->frictions; i++) friction_tangential(b, i, b->lambda, f->tangential + 2 * i);

@@ -177,16 +177,14 @@ static double mass_of(const Mechanism *b, int j) {
     return 0;
 }
 
-/* Accelerations (n) before forces cancel: at least what each coordinate's forces give it alone. */
-static void find_felt(const Mechanism *b, double *felt) {
-    const System *s = b->system;
-    for (int j = 0; j < s->nv; j++) felt[j] = fabs(b->F[j]);
-    for (int e = 0; e < s->entries; e++)
-        felt[s->entry_column[e]] += fabs(b->G[e]) * fabs(b->lambda[s->entry_row[e]]);
-    for (int j = 0; j < s->nv; j++) {
-        const double mass = mass_of(b, j);
-        felt[j] = larger(mass > 0 ? felt[j] / mass : 0, fabs(b->vdot[j]));
-    }
+/* Accelerations (nv) before forces cancel.  Times the root of its mass all have one dimension, in which what is
+ * rounding of the largest is none: where no force has a lever arm, that of a torque would be all that turns a body. */
+static void find_felt(const Mechanism *b, double *forces, double *felt) {
+    double most = 0;
+    mechanism_at_work(b, forces, felt);
+    for (int j = 0; j < b->system->nv; j++) most = larger(most, sqrt(mass_of(b, j)) * felt[j]);
+    for (int j = 0; j < b->system->nv; j++)
+        if (sqrt(mass_of(b, j)) * felt[j] < DBL_EPSILON * most) felt[j] = 0;
 }
 
 /* A rate whose square is a double too. */
@@ -380,7 +378,7 @@ static Status find_scales(Solver *s, const double *own, const double *shaken) {
 Status nominals_complete(Solver *s, Instant at, double span) {
     const int n = s->system->nq;
     double *felt = s->work_initial + n, *own = felt + n, *back = own + n, *shaken = back + n;
-    find_felt(&s->stepped, felt);
+    find_felt(&s->stepped, s->work_initial, felt);
     const double natural = find_own(s, span, felt, own);
     if (find_held(s, at, back, shaken) != OK) return FAILED;
     if (!(s->state.now.rate > 0)) s->state.now.rate = find_natural_rate(s, span, felt, back, natural);
