@@ -409,7 +409,7 @@ def derive(model: Model) -> EquationsOfMotion:
     problems: list[str] = []
 
     energy = model.energy_expression.xreplace(table).xreplace(closed.symbols)
-    M, F = _left_hand_side(list(_terms(energy)), moving, clock, problems)
+    M, F = _left_hand_side(list(_terms(energy)), _opened(moving, qdot), clock, problems)
     for direction, force in model.forces.items():
         F[model.directions.index(direction)] += sp.sympify(force).xreplace(table)
 
@@ -470,6 +470,14 @@ def derive(model: Model) -> EquationsOfMotion:
         outputs=tuple(_changed(o, lambda e: e.xreplace(table)) for o in model.outputs),
     )
     return made.mapped(lambda e: e.xreplace(opened)) if opened else made
+
+
+def _opened(moving: Kinematics, qdot: tuple[Expr, ...]) -> Kinematics:
+    """With the rates of unwrapped angles as they stand: what is closed in them hides speeds."""
+    rates = list(moving.rates)
+    for j in moving.unwrapped & set(range(len(qdot))):
+        rates[j] = qdot[j]
+    return replace(moving, rates=tuple(rates))
 
 
 def _friction(f: Friction, table: dict[Expr, Expr]) -> FrictionLaw:
