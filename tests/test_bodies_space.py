@@ -401,7 +401,9 @@ def test_a_torsion_spring_turns_both_wheels_of_its_shaft():
     twist = 0.1 + 0.3 * np.cos(np.sqrt(150.0) * run["time"])
     np.testing.assert_allclose(run["angle.B"], twist, atol=1e-9)
     np.testing.assert_allclose(run["torque.spring"], 0.1 - twist, atol=1e-9)
-    np.testing.assert_allclose(0.02 * run["one.omega.z"] + 0.01 * run["two.omega.z"], 0.15, atol=1e-9)
+    np.testing.assert_allclose(
+        0.02 * run["one.omega.z"] + 0.01 * run["two.omega.z"], 0.15, atol=1e-9
+    )
 
 
 arm = Body("arm", 1.0, (0.1, 0.1, 0.1))
