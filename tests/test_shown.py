@@ -188,10 +188,9 @@ def test_show_prints_coulombs_law() -> None:
     assert "grip slips    λ_touch = -μ |λ_lane| (ẋ - R φ̇)/|ẋ - R φ̇|" in shown
 
 
-def test_what_joints_let_go_is_told_without_an_elimination(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_joints_let_go_is_told_without_an_elimination() -> None:
     """A rubbing hinge between two bodies in space and a ball that rolls: rows on velocities, whose slip is
     told by the FMU's name.  Whether they are integrable on thirteen surfaces would take minutes."""
-    monkeypatch.setattr("lagfmu.page.text.classify", None)
     one, two, ball = (Body(name, 1.0, (0.1, 0.1, 0.1)) for name in ("one", "two", "ball"))
     joints = [
         Revolute("A", Ground().at((0, 0, 0)), one.at((0, 0, 0)), axis="y"),
