@@ -17,6 +17,7 @@ its states, and against native on every scene (test_targets_agree.py).
 
 from __future__ import annotations
 
+import gc
 import os
 import pickle
 from collections.abc import Callable, Container, Iterable, Iterator, Sequence
@@ -45,6 +46,8 @@ from lagfmu.testing import (
     write,
 )
 from lagfmu.testing import playable as playable_of
+
+gc.set_threshold(100_000, 20, 20)  # as the command has it
 
 MODELS = Path(__file__).parent.parent / "models"
 FILES = {
@@ -108,15 +111,16 @@ def of_each_kind(
     ]
 
 
+@cache
 def model_file(name: str) -> ModelFile:
-    """A file of models/, or of benchmarks/."""
+    """A file of models/, or of benchmarks/, loaded once."""
     path = MODELS / f"{name}.py"
     return load(path if path.exists() else MODELS.parent / "benchmarks" / path.name)
 
 
 def scene_of(name: str) -> tuple[ModelFile, Scene]:
     """The model file and the scene of an FMU of models/."""
-    file = load(MODELS / f"{EVERY[name]}.py")
+    file = model_file(EVERY[name])
     return file, next(s for s in file.scenes if s.name == name)
 
 
@@ -145,7 +149,7 @@ def _built(prepared: Callable[[str], Prepared], folder: Path, target: str, fmi: 
     face = Face(fmi)
 
     def get(name: str) -> Path:
-        forms = load(MODELS / f"{EVERY[name]}.py").closed_forms
+        forms = model_file(EVERY[name]).closed_forms
 
         def make(place: Path) -> None:
             write(prepared(name), place, forms, target=target, face=face)

@@ -6,7 +6,7 @@ import zipfile
 from dataclasses import replace
 
 import pytest
-from conftest import MODELS
+from conftest import MODELS, model_file
 from fmpy import read_model_description
 from sympy import symbols
 from sympy.physics.mechanics import dynamicsymbols
@@ -136,7 +136,7 @@ def test_without_a_compiler_what_slips_is_refused_with_the_remedy(monkeypatch):
     """A block on a belt sticks and slips, which native FMUs alone do: the refusal names the friction, and the
     package that compiles it."""
     monkeypatch.setattr(targets, "find_compiler", lambda: None)
-    file = load(MODELS / "belt.py")
+    file = model_file("belt")
     told = r"does not slip \(friction 'grip'\); build --target native \(.*pip install ziglang"
     with pytest.warns(NoCompilerWarning), pytest.raises(BuildError, match=told):
         simulate(file.model, 0.1, scene=file.scenes[0])

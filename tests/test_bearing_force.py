@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import MODELS
+from conftest import MODELS, model_file
 from typer.testing import CliRunner
 
 import lagfmu
@@ -38,16 +38,10 @@ def test_the_mechanism_of_the_page_is_that_of_the_file():
     exec(re.search(r"```python\n(.*?)```", PAGE, re.DOTALL)[1], told)
     runs = [
         lagfmu.simulate(source, stop_time=0.5, step_size=0.01)
-        for source in (told["model"], _model())
+        for source in (told["model"], model_file("slider_crank_bodies").model)
     ]
     for name in ("force.A.norm", "force.B.norm"):
         assert (runs[0][name] == runs[1][name]).all()
-
-
-def _model() -> lagfmu.Model:
-    from lagfmu.testing import load
-
-    return load(MODELS / "slider_crank_bodies.py").model
 
 
 def test_the_figures_of_the_page_are_those_of_the_commands(printed, tmp_path):

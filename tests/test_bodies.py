@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import sympy
+from conftest import model_file
 from sympy import symbols
 from sympy.physics.vector import dynamicsymbols
 
@@ -35,7 +36,7 @@ from lagfmu.bodies import (
     mechanism,
 )
 from lagfmu.errors import ModelError
-from lagfmu.testing import load, prepare, typeset, write
+from lagfmu.testing import prepare, typeset, write
 
 g = 9.81  # m/s^2
 t = dynamicsymbols._t
@@ -56,7 +57,7 @@ def plane(*, bodies, name="M", **parts):
 
 def test_the_forces_of_a_slider_crank_are_those_of_d_alembert(tmp_path):
     """Both targets; and with another crank, a heavier piston and a longer rod."""
-    file = load(MODELS / "slider_crank_bodies.py")
+    file = model_file("slider_crank_bodies")
     (scene,) = file.scenes
     for target in ("native", "python"):
         fmu = write(prepare(file.model, scene), tmp_path, file.closed_forms, target=target)
@@ -69,7 +70,7 @@ def test_the_forces_of_a_slider_crank_are_those_of_d_alembert(tmp_path):
 
 def test_a_mechanism_is_told_by_its_parts():
     """What is read of a mechanism is a line a body and a joint, not Lagrange's equations written out."""
-    (section,) = typeset(prepare(load(MODELS / "slider_crank_bodies.py").model).form)
+    (section,) = typeset(prepare(model_file("slider_crank_bodies").model).form)
     lines = {e.label: e.text for e in section.equations}
     told = {name: lines[name] for name in ("crank", "B", "D")}
     assert told == {
@@ -489,7 +490,7 @@ def test_a_mechanism_is_assembled_from_the_joint_coordinates_that_are_given():
 def test_another_length_moves_what_was_only_assembled(target):
     """With a longer rod and another crank the given angle and its rate stay; the piston is where the triangle
     of crank and rod says."""
-    model = load(MODELS / "slider_crank_bodies.py").model
+    model = model_file("slider_crank_bodies").model
     changed = {"A.second.x": -0.12, "B.first.x": 0.13, "C.first.x": 0.4}
     with warnings.catch_warnings():
         warnings.simplefilter("error")  # no given value moves

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import model_file
 from scipy.integrate import solve_ivp
 from sympy import Symbol, cos, sin
 from sympy.physics.vector import dynamicsymbols
@@ -35,7 +36,6 @@ from lagfmu.bodies import (
     mechanism,
 )
 from lagfmu.errors import ModelError
-from lagfmu.testing import load
 
 g = 9.81  # m/s^2
 s, TURN, TIME = Symbol("s"), Symbol("turn"), dynamicsymbols._t
@@ -230,7 +230,7 @@ def test_of_a_redundant_slider_crank_these_forces_are_unique_and_right():
     assert unique - of_rows == parts | still
     assert not any(told[n].any() for n in told.keys() - unique)
     assert sum(n.count(".") == 1 for n in told) == 20
-    file = load(MODELS / "slider_crank_bodies.py")
+    file = model_file("slider_crank_bodies")
     flat = simulate(file.model, 0.5, 0.05, tolerance=1e-11, target="python")
     for n in [
         "angle.A",

@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import MODELS
+from conftest import model_file
 from lxml import etree
 from typer.testing import CliRunner
 
 import lagfmu
 from lagfmu import Result
-from lagfmu.testing import COLOURS, app, figure_of, load
+from lagfmu.testing import COLOURS, app, figure_of
 
 REPOSITORY = Path(__file__).parent.parent
 README = (REPOSITORY / "README.md").read_text(encoding="utf-8")
@@ -83,7 +83,7 @@ def test_the_figure_of_the_readme_is_drawn_by_its_command(tmp_path: Path) -> Non
 def test_truths_and_counts_are_steps() -> None:
     """Whether the block on the belt sticks is no or yes, how often it has slipped a whole number: no line
     leads through values between, and each has a panel of its own beside quantities without a unit."""
-    run = lagfmu.simulate(load(MODELS / "belt.py").model, 3.0, 0.01)
+    run = lagfmu.simulate(model_file("belt").model, 3.0, 0.01)
     counts, truths = run.plot("slipping.grip.count", "sticks.grip").axes
     for axes in (counts, truths):
         assert {line.get_drawstyle() for line in axes.lines[:1]} == {"steps-post"}

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from conftest import model_file
 from instance import instance
 from sympy import symbols
 from sympy.physics.mechanics import dynamicsymbols
@@ -25,7 +26,7 @@ from lagfmu import (
     simulate,
 )
 from lagfmu.errors import ModelError, SimulationError
-from lagfmu.testing import carried, check_closed_form, find_compiler, lagrange, load, prepare
+from lagfmu.testing import carried, check_closed_form, find_compiler, lagrange, prepare
 
 MODELS = Path(__file__).parent.parent / "models"
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
@@ -97,7 +98,7 @@ def test_events_do_not_depend_on_the_communication_step(native_fmu: Any, name: s
 def test_a_friction_that_shall_not_slip_is_the_plain_constraint() -> None:
     """Scene(frictions=()): on a smooth incline the disk rolls, lambda = -(1/3) M g sin(alpha); coefficients,
     modes and heat are no more, and `minimal` is there again."""
-    file = load(MODELS / "incline_friction.py")
+    file = model_file("incline_friction")
     scene = Scene("Rolls", frictions=(), contacts=(), formulation="minimal")
     run = simulate(file.model, scene=scene, stop_time=1.0, step_size=0.5)
     assert run["lambda.rolling"] == pytest.approx(-g * np.sin(np.pi / 6) / 3, rel=1e-12)
@@ -284,7 +285,7 @@ def test_a_power_that_is_no_number_is_refused(native_fmu: Any) -> None:
 def test_no_unit_of_mass_moves_the_cone(mass: float) -> None:
     """A rod of any mass slips at the same time, under lambda in proportion to its mass: the square of 1e-300
     is 0 and that of 1e300 infinite, but no friction sticks outside of its cone for that."""
-    file = load(MODELS / "falling_rod.py")
+    file = model_file("falling_rod")
     run, other = (
         simulate(file.model, 0.7, 0.07, start_values={"m": m}, scene=file.scenes[0])
         for m in (1.0, mass)
@@ -297,7 +298,7 @@ def test_no_unit_of_mass_moves_the_cone(mass: float) -> None:
 def test_what_slipping_has_cost_scales_with_gravity(gravity: float) -> None:
     """Energy goes as m g l, in times of sqrt(l/g): the share that friction has taken when the rod has fallen
     is the same on any planet. lambda_t . s of 1e-300 m/s^2 is below the smallest double; its work is not."""
-    file = load(MODELS / "falling_rod.py")
+    file = model_file("falling_rod")
     shares = []
     for g in (9.81, gravity):
         time = 0.7 * math.sqrt(9.81 / g)

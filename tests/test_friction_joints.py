@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from conftest import model_file
 from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 from sympy import cos, sin, symbols
@@ -29,7 +30,7 @@ from lagfmu import (
     simulate,
 )
 from lagfmu.errors import LagfmuError, ModelError, SimulationError
-from lagfmu.testing import StartMovedWarning, find_compiler, load
+from lagfmu.testing import StartMovedWarning, find_compiler
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
 MODELS = Path(__file__).parent.parent / "models"
@@ -384,7 +385,7 @@ def test_the_order_of_the_joints_changes_nothing(
     crank: Path, built: Build, order: Sequence[int]
 ) -> None:
     """Frictions and constraints declared in another order: the same motion and the same forces."""
-    model = load(MODELS / "crank_with_bearing_friction.py").model
+    model = model_file("crank_with_bearing_friction").model
     frictions = [model.frictions[k] for k in order]
     other = Model(
         **{
@@ -404,7 +405,7 @@ def test_the_order_of_the_joints_changes_nothing(
 
 def pushed(order: Sequence[int] = (0, 1, 2, 3)) -> Model:
     """The slider-crank at rest, under the torque `torque` + 0.5 N.m/s t, its static coefficients 0.6."""
-    model = load(MODELS / "crank_with_bearing_friction.py").model
+    model = model_file("crank_with_bearing_friction").model
     torque = symbols("torque")
     phi1 = next(q for q in model.coordinates if str(q.func) == "phi1")
     frictions = [model.frictions[k] for k in order]

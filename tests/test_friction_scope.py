@@ -28,7 +28,7 @@ from lagfmu import (
     simulate,
 )
 from lagfmu.errors import ModelError
-from lagfmu.testing import app, find_compiler, load
+from lagfmu.testing import app, find_compiler
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
 MODELS = Path(__file__).parent.parent / "models"
@@ -53,7 +53,7 @@ def test_without_multipliers_in_the_equations_friction_is_the_same(
 ) -> None:
     """`nullspace` eliminates lambda from the equations of motion and reports it: the block on the belt
     sticks, slips and turns as with `multipliers`."""
-    other = built(load(MODELS / "belt.py").model, Scene("Belt", formulation="nullspace"))
+    other = built(model_file("belt").model, Scene("Belt", formulation="nullspace"))
     run = {"stop_time": 2.0, "step_size": 0.05, "tolerance": 1e-10}
     ours, theirs = simulate(belt, **run), simulate(other, **run)
     assert ours["slipping.grip.count"][-1] == 3
@@ -65,7 +65,7 @@ def test_without_multipliers_in_the_equations_friction_is_the_same(
 def test_an_embedding_is_refused_by_name() -> None:
     """It leaves no normal force, which the cone needs."""
     x, z, s = dynamicsymbols("x z s")
-    plain = load(MODELS / "belt.py").model
+    plain = model_file("belt").model
     with pytest.raises(ModelError, match="friction with an embedding: the normal force is needed"):
         Model(
             name="Embedded",

@@ -5,21 +5,20 @@ from __future__ import annotations
 import fmpy
 import numpy as np
 import pytest
-from conftest import MODELS
+from conftest import model_file
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 from sympy import symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Holonomic, Input, Model, Parameter, simulate
-from lagfmu.testing import load
 
 M, J, m, g, a, b, k, c, v = 1200.0, 1500.0, 80.0, 9.81, 1.2, 1.5, 4e4, 3e3, 14.0
 
 
 def first_departure() -> float:
     """The front wheel's, from the body's own equations on two moving feet: independent of lagfmu."""
-    road = next(s for s in load(MODELS / "half_car.py").model.splines)
+    road = next(s for s in model_file("half_car").model.splines)
     y = CubicSpline(road.x, road.y, bc_type="natural")
     load_f, load_r = M * g * b / (a + b), M * g * a / (a + b)
 

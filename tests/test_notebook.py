@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import MODELS
+from conftest import MODELS, model_file
 from sympy import cos, simplify, sin, symbols
 from sympy.physics.mechanics import LagrangesMethod, dynamicsymbols
 from typer.testing import CliRunner
@@ -19,7 +19,7 @@ from typer.testing import CliRunner
 import lagfmu
 from lagfmu import derive
 from lagfmu.errors import DerivationError
-from lagfmu.testing import app, known, load
+from lagfmu.testing import app, known
 
 DOCS = MODELS.parent / "docs"
 LESSONS = sorted((DOCS / "mechanics").glob("*.md"))
@@ -48,7 +48,7 @@ WORDS = {  # what a lesson prints besides equal numbers and True
 @pytest.mark.parametrize("name", ["hemisphere", "knife_edge", "rotating_wire"])
 def test_lambda_as_a_formula_is_the_lambda_of_the_simulation(name):
     """Evaluated along the simulated motion, the formula gives the multiplier that the solver found."""
-    file = load(MODELS / f"{name}.py")
+    file = model_file(name)
     formulas = derive(file.model).multipliers()
     run = lagfmu.simulate(file.model, 0.5, 0.05)
     t = symbols("t")
@@ -67,7 +67,7 @@ def test_lambda_as_a_formula_is_the_lambda_of_the_simulation(name):
 
 def test_the_disk_on_the_incline_holds_a_third_of_its_weight():
     """lambda = -M g sin(alpha) / 3, in symbols."""
-    found = derive(load(MODELS / "incline_disk.py").model).multipliers()["rolling"]
+    found = derive(model_file("incline_disk").model).multipliers()["rolling"]
     named = {str(s): s for s in found.free_symbols}
     expected = -named["M"] * named["g"] * sin(named["alpha"]) / 3
     assert simplify(found - expected) == 0
@@ -76,7 +76,7 @@ def test_the_disk_on_the_incline_holds_a_third_of_its_weight():
 def test_a_formula_that_would_be_no_help_is_refused():
     """A chain of many links: the message says how large, and what to do."""
     with pytest.raises(DerivationError, match="for small systems"):
-        derive(load(MODELS / "chain.py").model).multipliers()
+        derive(model_file("chain").model).multipliers()
 
 
 def test_two_calls_lead_from_a_lagranges_method_to_a_figure(tmp_path):
@@ -101,7 +101,7 @@ def test_two_calls_lead_from_a_lagranges_method_to_a_figure(tmp_path):
 
 def test_a_result_is_an_array_with_units():
     """Columns by name; a short table; pandas and xarray keep the units."""
-    run = lagfmu.simulate(load(MODELS / "incline_disk.py").model, 1.0, 0.25)
+    run = lagfmu.simulate(model_file("incline_disk").model, 1.0, 0.25)
     text = repr(run)
     assert max(map(len, text.splitlines())) <= 80
     assert "lambda.rolling" in text
@@ -118,7 +118,7 @@ def test_a_result_is_an_array_with_units():
 
 def test_models_typeset_themselves():
     """The equations as MathML and LaTeX; a classification with its integral."""
-    model = load(MODELS / "hemisphere.py").model
+    model = model_file("hemisphere").model
     assert "<math" in model._repr_html_()
     assert "\\lambda" in derive(model)._repr_latex_()
     x, y = dynamicsymbols("x y")

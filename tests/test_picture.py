@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import sympy as sp
 from browser import Page
-from conftest import MODELS
+from conftest import model_file
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import (
@@ -34,7 +34,6 @@ from lagfmu.testing import (
     Moving,
     as_bytes,
     direction,
-    load,
     picture_of,
     prepare,
     read_picture,
@@ -50,7 +49,7 @@ L = sp.symbols("L", positive=True)
 
 
 def model_of(name: str) -> Model:
-    return load(MODELS / f"{name}.py").model
+    return model_file(name).model
 
 
 def pendulum(**fields: Any) -> Model:

@@ -11,13 +11,13 @@ from pathlib import Path
 
 import pytest
 from browser import Page as Opened
-from conftest import MODELS
+from conftest import model_file
 from sympy import Symbol
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Model, Page, Scene
 from lagfmu.errors import BuildError, ModelError
-from lagfmu.testing import IN_FMU, Prepared, load, prepare, preset_of, read_preset, told_by
+from lagfmu.testing import IN_FMU, Prepared, prepare, preset_of, read_preset, told_by
 
 SHOWN = """() => ({
     sliders: [...document.querySelectorAll("#dials details[open] input[data-name]")]
@@ -30,7 +30,7 @@ SHOWN = """() => ({
 
 
 def bead(page: object) -> Model:
-    return replace(load(MODELS / "hemisphere.py").model, page=page)
+    return replace(model_file("hemisphere").model, page=page)
 
 
 def test_a_page_shows_first_what_its_model_names(opened: Callable[..., Opened]) -> None:
@@ -64,7 +64,7 @@ def test_the_page_of_a_model_travels_in_its_fmu(
 def test_a_scene_leaves_out_what_its_fmu_does_not_have() -> None:
     """Sliders of parameters that are fixed, and curves that no importer reads."""
     scene = Scene("Some", outputs=["lambda.surface", "theta"], fixed=["m"])
-    made = preset_of(prepare(load(MODELS / "hemisphere.py").model, scene))
+    made = preset_of(prepare(model_file("hemisphere").model, scene))
     assert made is not None
     assert made["sliders"] == ["theta", "der(theta)", "a"]
     assert made["curves"] == ["lambda.surface", "theta"]

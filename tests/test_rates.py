@@ -8,14 +8,13 @@ import fmpy
 import fmpy.validation
 import numpy as np
 import pytest
-from conftest import MODELS
+from conftest import model_file
 from instance import instance
 from sympy import symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Contact, Holonomic, Input, Model, Nonholonomic, Parameter, Scene, simulate
 from lagfmu.errors import ModelError
-from lagfmu.testing import load
 
 W = np.pi / 8.0
 
@@ -162,7 +161,7 @@ def test_a_floor_that_was_pulled_away_is_left_as_soon_as_that_is_read(built, tar
 
 def crane(rates: str = "estimated"):
     """The crane of models/, whose winch is given by the rope's length alone."""
-    model = load(MODELS / "crane.py").model
+    model = model_file("crane").model
     inputs = [replace(i, rates=rates) if i.rate else i for i in model.inputs]
     return replace(model, inputs=inputs)
 
@@ -308,7 +307,7 @@ def test_rates_are_given_or_estimated():
         ModelError, match="rates of input 'l' is 'guessed', expected one of 'given'"
     ):
         crane("guessed")
-    model = load(MODELS / "crane.py").model
+    model = model_file("crane").model
     with pytest.raises(ModelError, match="rates of input 'F'"):
         replace(model, inputs=[replace(i, rates="estimated") for i in model.inputs])
 

@@ -9,13 +9,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import MODELS
+from conftest import MODELS, model_file
 from typer.testing import CliRunner
 
 import lagfmu
 from lagfmu import Scene
 from lagfmu.errors import SettingError, SimulationError
-from lagfmu.testing import app, happened, load, over_ranges, sensitivity
+from lagfmu.testing import app, happened, over_ranges, sensitivity
 
 LEAVES = "departure.surface.time"
 
@@ -100,7 +100,7 @@ def test_where_there_is_no_derivative_nobody_takes_its_zero(built, tmp_path):
     """With r as a plain number the start of the particle may go either way: the FMU gives no derivative by a,
     and 0 in its place.  A result does not know it, a plot leaves it out, a sweep has NaN, and `sensitivity`
     takes differences, which find none either."""
-    file = load(MODELS / "hemisphere.py")
+    file = model_file("hemisphere")
     start = {q: v for q, v in file.model.start.items() if str(q) != "r(t)"}
     (r,) = (q for q in file.model.start if str(q) == "r(t)")
     model = replace(file.model, start={**start, r: 1.0})

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import MODELS
+from conftest import MODELS, model_file
 from rich.cells import cell_len
 from typer.testing import CliRunner
 
@@ -83,7 +83,7 @@ def test_a_departure_that_has_not_been_has_no_time() -> None:
 
 def test_units_are_written_as_people_write_them() -> None:
     """N·m, kg·m²: the same in tables, figures and pages; names for machines stay as FMI has them."""
-    run = lagfmu.simulate(load(MODELS / "incline_disk.py").model, 1.0, 0.25)
+    run = lagfmu.simulate(model_file("incline_disk").model, 1.0, 0.25)
     assert run.units["Q.theta"] == "N.m"
     assert "N·m" in repr(run)
     assert "N·m" in run._repr_html_()
@@ -102,7 +102,7 @@ def test_a_zero_has_no_sign() -> None:
 
 def test_every_slip_is_marked_in_the_figure() -> None:
     """The block on the belt slips again and again: a dashed line at each of the times that the run tells."""
-    run = lagfmu.simulate(load(MODELS / "belt.py").model, 3.0, 0.01)
+    run = lagfmu.simulate(model_file("belt").model, 3.0, 0.01)
     told = moments(run, "slipping.count", "grip")
     assert len(told) == run["slipping.grip.count"][-1] > 3
     assert told == sorted(set(told))
@@ -126,7 +126,7 @@ def test_a_landing_without_rebound_takes_energy() -> None:
     """A ball that falls 1 m and stays: m g h is gone at sqrt(2 h/g) = 0.4515 s.  What is said of the energy
     holds until then where the losses are not known, at 46 points; who says himself where it holds (always)
     hears when it was missed first, and what happened there."""
-    file = load(MODELS / "bouncing_ball.py")
+    file = model_file("bouncing_ball")
     run = lagfmu.simulate(file.model, start_values={"e": 0.0})
     energy = output("energy.total")
     forms = [Conserved("energy", energy), Conserved("always", energy, when=1 + output("time"))]
@@ -145,7 +145,7 @@ def test_energy_and_what_was_lost_are_conserved() -> None:
     no linear function of the energy, and a closed form stay as they are."""
     energy, losses, g = output("energy.total"), output("energy.dissipated"), output("g")
     before = {"part": g * energy / 2, "named": energy + losses, "square": energy**2, "other": g}
-    scene = load(MODELS / "bouncing_ball.py").scenes[0]
+    scene = model_file("bouncing_ball").scenes[0]
     made = carried(scene, [Conserved(name, e) for name, e in before.items()])
     after = {form.name: form.with_losses().actual for form in made}
     assert after == before | {"part": g * energy / 2 + g * losses / 2}

@@ -9,13 +9,13 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from conftest import MODELS
+from conftest import model_file
 from typer.testing import CliRunner
 
 import lagfmu
 from lagfmu import Scene
 from lagfmu.errors import SettingError
-from lagfmu.testing import RECORD, app, load
+from lagfmu.testing import RECORD, app
 
 
 @pytest.fixture(scope="module")
@@ -256,7 +256,7 @@ def test_what_students_hand_in_is_corrected_by_file(foreign, native_fmu, tmp_pat
     ann, ben, eve = (tmp_path / f"{name}.fmu" for name in ("ann", "ben", "eve"))
     shutil.copy(foreign, ann)
     held = Scene("Hemisphere", stop_time=2.0, contacts=())
-    model = load(MODELS / "hemisphere.py").model
+    model = model_file("hemisphere").model
     shutil.copy(lagfmu.build_fmu(model, tmp_path, held, check=False), ben)
     shutil.copy(native_fmu("Loop"), eve)
     words = ["verify", ann, ben, eve, "--statements", tmp_path / "dome.toml"]

@@ -13,6 +13,7 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
+from conftest import model_file
 from rich.console import Console
 from scipy.special import ellipj, ellipk
 from test_cli import SMALL, lagfmu
@@ -26,7 +27,6 @@ from lagfmu.testing import (
     Tradeoff,
     bisected,
     choose,
-    load,
     measure,
     observe,
     opened,
@@ -41,7 +41,7 @@ from lagfmu.testing import parse_goal as parse
 from lagfmu.testing import tradeoff_table as table
 
 MODELS = Path(__file__).parent.parent / "models"
-PENDULUM = load(MODELS / "pendulum.py")
+PENDULUM = model_file("pendulum")
 SWING = Scene("Swing", stop_time=2.0, step_size=0.1)
 SHORT = Scene("Swing", stop_time=1.0, step_size=0.05)
 WIRE = Scene("Wire", stop_time=1.5, step_size=0.05)
@@ -49,7 +49,7 @@ WIRE = Scene("Wire", stop_time=1.5, step_size=0.05)
 
 def built(name: str, scene: Scene, folder: Path) -> Path:
     """The FMU of models/NAME.py in a scene of its own, with those closed forms that fit it."""
-    file = load(MODELS / f"{name}.py")
+    file = model_file(name)
     return write(prepare(file.model, scene), folder, file.closed_forms)
 
 

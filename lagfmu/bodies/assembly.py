@@ -82,7 +82,7 @@ def assemble(
 
         def closed_from(angles: Mapping[str, float]) -> tuple[Array, Array]:
             put = guessed(draft, model, parts, {**angles, **places})
-            return moving.newton([f, held], wanted, moving.tied(put, places))
+            return moving.newton([f, held], wanted, moving.tied(put, places), CLOSED)
 
         tell_second_branch(model, measures, closed_from, rough, q)
 
@@ -181,12 +181,17 @@ class _Moving:
         slopes = np.vstack([r.slopes(q) for r in rows]) / self.weight
         return bool(np.linalg.matrix_rank(slopes) == len(self.weight))
 
-    def newton(self, rows: Sequence[Rows], wanted: Array, q: Array) -> tuple[Array, Array]:
-        """Coordinates near q at which the rows have the wanted values, and what each misses."""
+    def newton(
+        self, rows: Sequence[Rows], wanted: Array, q: Array, enough: float = 0.0
+    ) -> tuple[Array, Array]:
+        """Coordinates near q at which the rows have the wanted values, and what each misses: at most
+        `enough`, or as little as can be."""
         r, A, size = self._missed(rows, wanted, q)
         if not (np.isfinite(r).all() and np.isfinite(A).all()):
             return q, np.full(len(r), np.inf)
         for _ in range(STEPS):
+            if np.abs(r / size).max(initial=0.0) <= enough:
+                break
             step = self._least(A / size[:, None], r / size)
             for halved in range(HALVINGS):
                 new = self.moved(q, step * 0.5**halved)
@@ -200,9 +205,9 @@ class _Moving:
 
     def _missed(self, rows: Sequence[Rows], wanted: Array, q: Array) -> tuple[Array, Array, Array]:
         """What is missing (m), the slopes (m, n_v), and how large a change each row sees (m)."""
-        A = np.vstack([r.slopes(q) for r in rows])
-        r = wanted - np.concatenate([row.values(q) for row in rows])
-        return r, A, self._sizes(A)
+        values, slopes = zip(*(row.values_and_slopes(q) for row in rows), strict=True)
+        A = np.vstack(slopes)
+        return wanted - np.concatenate(values), A, self._sizes(A)
 
     def _sizes(self, A: Array) -> Array:
         size = np.abs(A * self.scale).max(axis=1, initial=0.0)

@@ -67,6 +67,14 @@ class Rows:
             found[f.rows] = parts[0]
         return found
 
+    def values_and_slopes(self, q: Array) -> tuple[Array, Array]:
+        """e(q) (m), and the slopes of its rate by the speeds (m, n_v)."""
+        found, slopes = np.zeros(self.shape[0]), np.zeros(self.shape)
+        for f, parts in self._at(q):
+            found[f.rows] = parts[0]
+            slopes[f.rows[:, None], f.speeds] = parts[2:].T
+        return found, slopes
+
     def rates(self, q: Array, v: Array) -> Array:
         """Their rates (m)."""
         return self.slopes(q) @ v + self.drifts(q)
@@ -80,10 +88,7 @@ class Rows:
 
     def slopes(self, q: Array) -> Array:
         """Their slopes by the speeds (m, n_v)."""
-        found = np.zeros(self.shape)
-        for f, parts in self._at(q):
-            found[f.rows[:, None], f.speeds] = parts[2:].T
-        return found
+        return self.values_and_slopes(q)[1]
 
 
 @dataclass
