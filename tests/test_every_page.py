@@ -95,11 +95,7 @@ def is_set(v: Any) -> bool:
     return settable and v.type == "Real" and not v.name.startswith("solver.")
 
 
-# of the double wishbone a run that begins 1e-14 beside stops at 0.333 s, as if it were singular: to be mended
-PAGES = [name for name in EVERY if name != "DoubleWishbone"]
-
-
-@pytest.fixture(scope="module", params=of_each_kind(PAGES, kinds=SHOWN))
+@pytest.fixture(scope="module", params=of_each_kind(EVERY, kinds=SHOWN))
 def name(request: pytest.FixtureRequest) -> str:
     return str(request.param)
 

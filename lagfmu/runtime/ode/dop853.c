@@ -6,6 +6,12 @@
  *   err = h |E5|^2 / sqrt((|E5|^2 + 0.01 |E3|^2) n) ,
  *   E5 = sum_s e_s k_s ,   E3 = sum_s (b_s - bh_s) k_s
  *
+ * E5 is zero by chance where y'' has a kink (a knot of a table, max(0, x)) 0.26, 0.33, 0.47, 0.62 or 0.80 of the
+ * way through the step.  So a step must pass a second estimate too, E6 = sum_s w_s k_s in place of E5, which
+ * is not zero there.  w is the one combination of these stages that fulfils all conditions of order 6 (with 0
+ * on the right: sect. II.2, theorem 2.13), normalized so that a kink makes E5 and E6 equally large at most: of a
+ * smooth motion E6 is smaller than E5 by one power of h.
+ *
  * f(t + h, y1) is no stage of the step itself: it is evaluated when the next step or the dense
  * output needs it, after a projection only for the latter. */
 #include "restrict.h"
@@ -50,6 +56,11 @@ static const double
     e8 = 1.6643771824549864, e9 = -0.35032884874997366, e10 = 0.3341791187130175,
     e11 = 0.08192320648511571, e12 = -0.022355307863886294;
 
+static const double
+    w1 = -0.005425172591341704, w6 = 1.4729582229439728, w7 = 0.4546081102854715,
+    w8 = -1.8549983666691654, w9 = 0.15458500032343458, w10 = -0.21585116513152777,
+    w11 = -0.005876629160843775;
+
 /* dense output */
 static const double
     a14_1 = 0.056167502283047954, a14_7 = 0.25350021021662483, a14_8 = -0.2462390374708025,
@@ -81,6 +92,7 @@ static const double
     d7_14 = 96.32455395918828, d7_15 = -39.17726167561544, d7_16 = -149.72683625798564;
 /* clang-format on */
 
+static const double MISSED = 10; /* the second estimate, in units of the tolerance, of a step to be repeated */
 static const double SAFETY = 0.9, LEAST_FACTOR = 1.0 / 3, LARGEST_FACTOR = 6, RETREAT = 0.1;
 
 enum { DENSE_STAGES = 7 }; /* stages 6 to 12, which the dense output needs */
@@ -141,7 +153,14 @@ static Status dop853_stages(const Integrator *i, const Ode *ode, double h, doubl
     return OK;
 }
 
-/* The error in units of the tolerance; not a number if y1 is not finite. */
+/* The root-mean-square of an estimate of order 5 and one of order 3 combined (eq. II.10.17). */
+static double combined(double square5, double square3, int watched) {
+    const double denominator = square5 + 0.01 * square3;
+    return denominator == 0 ? 0 : square5 / sqrt(denominator * watched);
+}
+
+/* The error in units of the tolerance, by the second estimate where the first has missed it; not a number if y1 is
+ * not finite. */
 static double error_norm(const Integrator *i, const Control *control, double h, const double *k,
                          const double *RESTRICT y1, const double *RESTRICT sum) {
     const int n = i->ny, watched = i->watched;
@@ -149,19 +168,23 @@ static double error_norm(const Integrator *i, const Control *control, double h, 
     const double *RESTRICT y = i->y, *RESTRICT scale = control->scale, *RESTRICT k1 = i->f;
     const double *k6 = k + 4 * n, *k7 = k6 + n, *k8 = k7 + n, *k9 = k8 + n, *k10 = k9 + n;
     const double *k11 = k10 + n, *k12 = k11 + n;
-    double square5 = 0, square3 = 0;
+    double square6 = 0, square5 = 0, square3 = 0;
     for (int j = 0; j < watched; j++) {
+        double sixth = w1 * k1[j] + w6 * k6[j] + w7 * k7[j] + w8 * k8[j] + w9 * k9[j] +
+                       w10 * k10[j] + w11 * k11[j];
         double fifth = e1 * k1[j] + e6 * k6[j] + e7 * k7[j] + e8 * k8[j] + e9 * k9[j] +
                        e10 * k10[j] + e11 * k11[j] + e12 * k12[j];
         double third = sum[j] - bh1 * k1[j] - bh9 * k9[j] - bh12 * k12[j];
         double unit = 1 / step_size_weight(tolerance, y[j], y1[j], scale[j]);
-        fifth = h * fifth * unit; /* h first: rates and units may be too large to be squared */
+        sixth = h * sixth * unit; /* h first: rates and units may be too large to be squared */
+        fifth = h * fifth * unit;
         third = h * third * unit;
+        square6 += sixth * sixth;
         square5 += fifth * fifth + 0 * y1[j];
         square3 += third * third;
     }
-    double denominator = square5 + 0.01 * square3;
-    return denominator == 0 ? 0 : square5 / sqrt(denominator * watched);
+    const double error = combined(square5, square3, watched), second = combined(square6, square3, watched);
+    return error <= 1 && second > MISSED ? second : error;
 }
 
 /* h_new / h = 0.9 err^(-1/8), within limits (eq. II.4.13). */
