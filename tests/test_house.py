@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 import lagfmu
+from lagfmu.codegen.c.printer import HELPERS
 
 ROOT = Path(lagfmu.__file__).parent
 ROOMS = (  # each imports from those before it, and from no other
@@ -222,8 +223,8 @@ def numbers_of(bare: str) -> set[str]:
 
 
 def test_a_name_of_the_runtime_stands_in_one_file() -> None:
-    """An FMU's all.c includes its C files one behind the other: no two of them define the same name; but the
-    faces of two versions of FMI are never in one FMU."""
+    """An FMU's all.c includes its C files one behind the other, the model's last: no two of them define the
+    same name; but the faces of two versions of FMI are never in one FMU."""
     places: dict[str, list[str]] = {}
     for path in sorted(ROOT.joinpath("runtime").rglob("*.c")):
         for name in names_of(path.read_text(encoding="utf-8")):
@@ -232,6 +233,9 @@ def test_a_name_of_the_runtime_stands_in_one_file() -> None:
         bare = TOKENS.sub("", path.read_text(encoding="utf-8"))
         for name in {*OWN_NAMES[0].findall(bare), *numbers_of(bare)}:
             places.setdefault(name, []).append(path.name)
+    for helper in HELPERS.values():
+        for name in names_of(helper):
+            places.setdefault(name, []).append("the model's own")
     for version in ("fmi2", "fmi3"):
         held = {
             name: [f for f in files if not f.startswith(version)] for name, files in places.items()

@@ -17,13 +17,14 @@ import binaries
 import numpy as np
 import pytest
 import runs
-from conftest import BOTH, MODELS, of_each_kind
+from conftest import BOTH, EVERY, MODELS, of_each_kind
 from fmi2 import FUNCTIONS
 from fmpy import extract, read_model_description, simulate_fmu
 from fmpy.build import build_platform_binary
 from fmpy.validation import validate_fmu
 from once import once
 from runtime import INCLUDES, RUNTIME_FILES
+from runtime import compiler as compiler_here
 from typer.testing import CliRunner
 
 from lagfmu import names
@@ -379,6 +380,19 @@ def test_the_drift_of_model_exchange_is_bounded(native_fmu):
     assert len(found) == 201
     assert abs(found["residual.rod"]).max() < 1e-4
     assert abs(found["residual.rod"]).max() > 0
+
+
+@pytest.mark.parametrize("name", of_each_kind(EVERY))
+def test_the_listed_source_is_a_program(native_fmu, tmp_path, name):
+    """An importer compiles the one file that the description lists: what all others define, in the runtime
+    and in the model, is there once."""
+    with zipfile.ZipFile(native_fmu(name)) as archive:
+        archive.extractall(tmp_path)
+    command = [compiler_here(), "-std=c99", "-fsyntax-only", "-Werror", "all.c"]
+    run = subprocess.run(
+        command, cwd=tmp_path / "sources", capture_output=True, text=True, timeout=120
+    )
+    assert run.returncode == 0, run.stderr[:1000]
 
 
 @pytest.mark.thorough

@@ -113,9 +113,9 @@ Interval interval_magnitude(Interval a) {
     return (Interval){most(most(a.low, -a.high), 0), most(-a.low, a.high)};
 }
 
-static double sign(double x) { return (x > 0) - (x < 0); }
+static double sign_of(double x) { return (x > 0) - (x < 0); }
 
-Interval interval_sign(Interval a) { return (Interval){sign(a.low), sign(a.high)}; }
+Interval interval_sign(Interval a) { return (Interval){sign_of(a.low), sign_of(a.high)}; }
 
 Interval interval_heaviside(Interval a) { return (Interval){a.low > 0, a.high >= 0}; }
 

@@ -92,7 +92,6 @@ static const double
     d7_14 = 96.32455395918828, d7_15 = -39.17726167561544, d7_16 = -149.72683625798564;
 /* clang-format on */
 
-static const double MISSED = 10; /* the second estimate, in units of the tolerance, of a step to be repeated */
 static const double SAFETY = 0.9, LEAST_FACTOR = 1.0 / 3, LARGEST_FACTOR = 6, RETREAT = 0.1;
 
 enum { DENSE_STAGES = 7 }; /* stages 6 to 12, which the dense output needs */
@@ -159,8 +158,8 @@ static double combined(double square5, double square3, int watched) {
     return denominator == 0 ? 0 : square5 / sqrt(denominator * watched);
 }
 
-/* The error in units of the tolerance, by the second estimate where the first has missed it; not a number if y1 is
- * not finite. */
+/* The error in units of the tolerance; by the second estimate where that alone is above 1.  Not a number if y1 is not
+ * finite. */
 static double error_norm(const Integrator *i, const Control *control, double h, const double *k,
                          const double *RESTRICT y1, const double *RESTRICT sum) {
     const int n = i->ny, watched = i->watched;
@@ -184,7 +183,7 @@ static double error_norm(const Integrator *i, const Control *control, double h, 
         square3 += third * third;
     }
     const double error = combined(square5, square3, watched), second = combined(square6, square3, watched);
-    return error <= 1 && second > MISSED ? second : error;
+    return error <= 1 && second > 1 ? second : error;
 }
 
 /* h_new / h = 0.9 err^(-1/8), within limits (eq. II.4.13). */

@@ -303,7 +303,7 @@ static Status pass(Solver *s, double t, const double *end) {
 }
 
 /* Hermite's cubic between the ends of a step. */
-static void cubic(const Integrator *i, double t, double *y) {
+static void cubic_between(const Integrator *i, double t, double *y) {
     const double h = i->t - i->t_old, a = (t - i->t_old) / h, b = 1 - a;
     for (int j = 0; j < i->ny; j++)
         y[j] = b * b * ((1 + 2 * a) * i->y_old[j] + a * h * i->f_old[j]) +
@@ -322,7 +322,7 @@ static void begin_step(Solver *s) {
 static Status step(Solver *s, int *event) {
     Integrator *i = &s->integrator;
     const size_t bytes = (size_t)i->ny * sizeof(double);
-    Stretch x = {.s = s, .dense = cubic, .exchange = 1};
+    Stretch x = {.s = s, .dense = cubic_between, .exchange = 1};
     const double begin = s->state.now.t_integrator;
     if (!(s->state.now.t > begin)) return OK;
     memcpy(i->y_old, i->y, bytes);
