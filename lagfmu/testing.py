@@ -14,7 +14,7 @@ from .codegen.c import elimination
 from .codegen.c import function as c_function
 from .codegen.c.elimination import Elimination, eliminate, plan
 from .codegen.c.equations import model_source
-from .codegen.c.printer import identifiers, number, string
+from .codegen.c.printer import HELPERS, identifiers, number, string
 from .codegen.c.solve import solve_source
 from .codegen.py.equations import lower
 from .fmu import compiler, described

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import lagfmu
-from lagfmu.codegen.c.printer import HELPERS
+from lagfmu.testing import HELPERS
 
 ROOT = Path(lagfmu.__file__).parent
 ROOMS = (  # each imports from those before it, and from no other
