@@ -16,10 +16,16 @@ struct Derived {
     double *value;   /* (end[COLUMN_COUNT - 1] - first) of the variables that are derivatives, column by column */
     int first, *end; /* the position of the first, and (columns) the one behind the last of each */
     int done;        /* 1: the values belong to the state that is observed */
+    int moving;      /* 1: some are of the motion, not of what a state remembers */
     double *q, *v;   /* (nq), (nv) of the full system: of an event */
 };
 
 static int is_derivative(int k) { return VARIABLES[k].place == AT_SENSITIVITY; }
+
+/* Does a state remember it, of an event or an extreme? */
+static int is_remembered(const Variable *of) {
+    return of->place == AT_IMPULSE || of->place == AT_LOST || is_of_peak(of->place) || is_of_event(of->place);
+}
 
 static void layout_derivatives(Instance *x, Arena *scratch) {
     struct Derived counted, *d = arena_take(scratch, 1, sizeof *d);
@@ -31,7 +37,11 @@ static void layout_derivatives(Instance *x, Arena *scratch) {
     const int end = k;
     while (k > 0 && is_derivative(k - 1)) k -= 1;
     d->first = k;
-    for (int j = k; j < end && d->end != NULL; j++) d->end[VARIABLES[j].contact] = j + 1;
+    d->moving = 0;
+    for (int j = k; j < end && d->end != NULL; j++) {
+        d->end[VARIABLES[j].contact] = j + 1;
+        d->moving |= !is_remembered(&VARIABLES[VARIABLES[j].index]);
+    }
     d->value = arena_doubles(scratch, end - k);
     const System *full = MODEL_SYSTEM->full;
     d->q = arena_doubles(scratch, full != NULL ? full->nq : 0);
@@ -79,10 +89,6 @@ static double at_event(Instance *x, const Variable *of, const double *column) {
     return event_part(of->place) == AT_DEPARTURE_Q ? d->q[of->index] : d->v[of->index];
 }
 
-static int is_remembered(const Variable *of) {
-    return of->place == AT_IMPULSE || of->place == AT_LOST || is_of_peak(of->place) || is_of_event(of->place);
-}
-
 /* What a state remembers. */
 static double remembered(Instance *x, const Variable *of, int c) {
     const System *system = x->solver.system;
@@ -114,13 +120,15 @@ static Status differentiate_along(Instance *x, int c, Direction *d) {
 static Status derive(Instance *x) {
     struct Derived *all = x->derived;
     Direction d;
-    if (instance_factor(x) != OK) return FAILED;
+    if (all->moving && instance_factor(x) != OK) return FAILED;
     for (int c = 0, k = all->first; c < COLUMN_COUNT; c++) {
-        if (differentiate_along(x, c, &d) != OK) return FAILED;
+        if (all->moving && differentiate_along(x, c, &d) != OK) return FAILED;
         for (; k < all->end[c]; k++) {
             const Variable *of = &VARIABLES[VARIABLES[k].index];
             double *value = &all->value[k - all->first];
-            if (!is_remembered(of) && instance_change(x, of, d, value) != OK)
+            if (is_remembered(of))
+                *value = remembered(x, of, c);
+            else if (instance_change(x, of, d, value) != OK)
                 *value = 0; /* of a multiplier that is not unique */
         }
     }
@@ -170,15 +178,10 @@ static void prepare_peaks(Instance *x) {
 static Status get_derivative(Instance *x, const Variable *v, double *value) {
     struct Derived *all = x->derived;
     *value = 0;
-    if (instance_observe(x) != OK) return FAILED;
+    if (!x->observed && instance_observe(x) != OK) return FAILED;
     if (!*x->solver.state.varied) return OK;
     if (v->place == AT_SENSITIVITY_VALID) {
         *value = 1;
-        return OK;
-    }
-    const Variable *of = &VARIABLES[v->index];
-    if (is_remembered(of)) {
-        *value = remembered(x, of, v->contact);
         return OK;
     }
     if (!all->done && derive(x) != OK) return FAILED;

@@ -130,6 +130,7 @@ static Status indicator(Instance *x, int i, double *value) {
 }
 
 Status instance_get(Instance *x, const Variable *v, double *value) {
+    if (v->place == AT_SENSITIVITY || v->place == AT_SENSITIVITY_VALID) return DERIVATIVES->get(x, v, value);
     const int estimated = v->place == AT_INPUT && x->solver.system->estimated_count > 0;
     if (v->place == AT_INPUT && x->between.paused && x->between.supplied[v->index]) {
         *value = x->between.value[v->index];
@@ -143,7 +144,6 @@ Status instance_get(Instance *x, const Variable *v, double *value) {
     if (v->place == AT_ERROR) return ERROR_BARS->get(x, v, value);
     if (v->place == AT_RESIDUAL_RATE || v->place == AT_RESIDUAL_ACCELERATION) return ALGEBRAIC->residual(x, v, value);
     if (v->place == AT_INDICATOR) return indicator(x, v->index, value);
-    if (v->place == AT_SENSITIVITY || v->place == AT_SENSITIVITY_VALID) return DERIVATIVES->get(x, v, value);
     if (solver_arrive(&x->solver) != OK) return FAILED;
     if (follow(x) != OK) return FAILED;
     if (estimated && instance_was_set(x, v, value)) return OK;

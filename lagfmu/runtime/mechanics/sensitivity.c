@@ -76,7 +76,7 @@ static void right_sides(Sensitivity *w, const Mechanism *b) {
     }
 }
 
-Status sensitivity_sides(Sensitivity *w, Mechanism *b, Instant at, const double *q, const double *v, Direction d) {
+static void find_sides(Sensitivity *w, Mechanism *b, Instant at, const double *q, const double *v, Direction d) {
     const System *s = b->system;
     s->tangent(at.t, q, v, at.u, at.p, d.dt, d.dq, d.dv, d.du, d.dp, w->dM, w->dF, w->dG, w->dnu,
                w->dgamma, w->df, w->denergy);
@@ -86,6 +86,10 @@ Status sensitivity_sides(Sensitivity *w, Mechanism *b, Instant at, const double 
     else
         memcpy(w->drate, d.dv, (size_t)s->nq * sizeof *w->drate);
     right_sides(w, b);
+}
+
+static Status check_sides(const Sensitivity *w, const Mechanism *b, Instant at) {
+    const System *s = b->system;
     for (int j = 0; j < s->nv; j++)
         if (!isfinite(w->b[j]))
             return fail(b->why, "the derivative of the force on %s is not finite at t = %.17g s",
@@ -97,14 +101,20 @@ Status sensitivity_sides(Sensitivity *w, Mechanism *b, Instant at, const double 
     return OK;
 }
 
+Status sensitivity_sides(Sensitivity *w, Mechanism *b, Instant at, const double *q, const double *v, Direction d) {
+    find_sides(w, b, at, q, v, d);
+    return check_sides(w, b, at);
+}
+
 Status sensitivity_along(Sensitivity *w, Mechanism *b, Instant at, const double *q,
                          const double *v, Direction d) {
     const System *s = b->system;
-    if (sensitivity_sides(w, b, at, q, v, d) != OK) return FAILED;
-    if (b->given != NULL) return linear_solve(&b->linear, w->b, w->c, w->dvdot, NULL);
-    const Status solved = w->slide != NULL ? w->slide(w, b, at, q, v, d)
-                                           : linear_solve(&b->linear, w->b, w->c, w->dvdot, w->dlambda);
-    if (solved == OK) return OK;
+    find_sides(w, b, at, q, v, d);
+    const Status solved = w->slide != NULL
+                              ? w->slide(w, b, at, q, v, d)
+                              : linear_solve(&b->linear, w->b, w->c, w->dvdot, b->given != NULL ? NULL : w->dlambda);
+    if (solved == OK) return OK; /* linear.h: what it solves is finite */
+    if (check_sides(w, b, at) != OK) return FAILED;
     for (int k = 0; k < s->m; k++)
         if (!b->linear.unique[k])
             return fail(b->why,

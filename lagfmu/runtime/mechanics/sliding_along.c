@@ -58,7 +58,7 @@ static double change_of_normal(const Sensitivity *w, const Mechanism *b, int i) 
 }
 
 /* dvdot and dlambda, of which those of the frictions that slip come last. */
-static Status solve(Sensitivity *w, Mechanism *b, const double *v, Direction d) {
+static Status solve_along(Sensitivity *w, Mechanism *b, const double *v, Direction d) {
     const System *s = b->system;
     struct FrictionForces *f = b->friction;
     const int n = s->nv, m = s->m, count = f->slipping;
@@ -123,7 +123,7 @@ Status sliding_along(Sensitivity *w, Mechanism *b, Instant at, const double *q, 
     if (b->friction->slipping > 0 || !b->stage)
         b->system->coulomb_tangent(at.t, q, v, at.u, at.p, d.dt, d.dq, d.dv, d.du, d.dp, w->dmu, w->dpart_load,
                                    w->dpart_c);
-    if (solve(w, b, v, d) != OK) return FAILED;
+    if (solve_along(w, b, v, d) != OK) return FAILED;
     if (!b->stage) find_reported(w, b, v, d.dv);
     return OK;
 }

@@ -17,12 +17,11 @@
 
 /* ------------------------------------------------------------------ rates */
 
-/* By the tangents, of the latest motion. */
+/* By the tangents, of the latest motion; inputs do not change. */
 static Status rates_along(Solver *s, Instant at, const double *y, const double *S, int parameter, double *rates) {
     const System *system = s->system;
     Sensitivity *w = &s->sensitivity;
     const Direction d = {0, S, S + system->nq, w->du, w->dp};
-    memset(w->du, 0, (size_t)system->inputs * sizeof *w->du);
     if (parameter >= 0) w->dp[parameter] = 1;
     const Status status = sensitivity_along(w, &s->stepped, at, y, y + system->nq, d);
     if (parameter >= 0) w->dp[parameter] = 0;
@@ -34,6 +33,7 @@ static Status rates_along(Solver *s, Instant at, const double *y, const double *
 static void variation_rates(Solver *s, double t, const double *y, double *rates) {
     const int n = system_states(s->system);
     const Instant at = segment_instant(s, t);
+    memset(s->sensitivity.du, 0, (size_t)s->system->inputs * sizeof *rates);
     for (int c = 0; c < s->columns && *s->state.varied; c++)
         if (rates_along(s, at, y, y + n * (1 + c), s->column[c].parameter, rates + n * c) != OK) saltation_end(s);
     if (!*s->state.varied) memset(rates, 0, (size_t)(n * s->columns) * sizeof *rates);
@@ -67,17 +67,18 @@ static Status project_speeds(Solver *s, Instant at, const double *y, const int *
     return OK;
 }
 
+/* With M and G as the projection of the state has left them. */
 static Status project_columns(Solver *s, Instant at, double *y) {
     const System *system = s->system;
-    const int n = system_states(system), nq = system->nq;
+    const int n = system_states(system);
     Mechanism *b = &s->stepped;
-    int acting = 0, fixed = 0;
-    if (mechanism_evaluate(b, at, y, y + nq) != OK) return FAILED;
+    int acting = 0, fixed = 0, all = 1;
     const int *active = b->sliding != NULL ? b->sliding->acting(b, s->active) : s->active;
     for (int k = 0; k < system->m; k++) {
         b->fixed[k] = active[k] && system->rows[k].kind != NONHOLONOMIC;
         acting |= active[k];
         fixed |= b->fixed[k];
+        all &= b->fixed[k] == active[k];
     }
     if (fixed && linear_factor(&b->linear, b->M, b->G, b->fixed) != OK) return FAILED;
     for (int c = 0; c < s->columns; c++) {
@@ -85,7 +86,7 @@ static Status project_columns(Solver *s, Instant at, double *y) {
         if (fixed && project_places(s, at, y, c, S) != OK) return FAILED;
         mechanism_settle_change(b, y, S);
     }
-    if (acting && linear_factor(&b->linear, b->M, b->G, active) != OK) return FAILED;
+    if (acting && !(fixed && all) && linear_factor(&b->linear, b->M, b->G, active) != OK) return FAILED;
     for (int c = 0; c < s->columns && acting; c++)
         if (project_speeds(s, at, y, active, c, y + n * (1 + c)) != OK) return FAILED;
     for (int j = n; j < solver_width(s); j++)
