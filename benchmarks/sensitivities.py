@@ -8,9 +8,8 @@ with parameters and start values up to 20 % off, run at a tolerance of 1e-11 wit
 outputs by three of its numbers.  They are held against central differences of fourth order of runs at 1e-13,
 at two steps, small ones and larger, where those know more.  How much they know is said by their difference,
 and by the scatter of the runs over the step: the impulse of the last of many rebounds is known to 1e-8 of
-itself, its difference at the small steps to a hundredth.  Where an event lies between the runs of a difference,
-or these know less than 1e-4, there is nothing to compare; where sensitivity.valid is false there are no
-derivatives.
+itself, its difference at the small steps to a hundredth.  Where an event lies between the runs, or they know
+less than 1e-4, there is nothing to compare; where sensitivity.valid is false there are no derivatives.
 
 Printed: points that agree (to 1e-6, three times what the differences know, and rounding, 1e-11 of the largest
 output of that unit by the number), that were flagged, that cannot
