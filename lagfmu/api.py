@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
@@ -28,6 +28,7 @@ from .model.model import Model
 from .model.scene import Scene
 from .page.notebook import html
 from .page.text import show as show_prepared
+from .page.text import show_besides
 from .prepare.prepare import Prepared, prepare
 from .study.tradeoff.choose import Choice, Tick, choose
 from .study.tradeoff.page import section
@@ -104,15 +105,18 @@ class Shown:
         self.prepared, self.untried = prepared, untried
 
     def __repr__(self) -> str:
+        return self._printed(show_prepared)
+
+    def _repr_html_(self) -> str:
+        return html(self.prepared.form) + f"<pre>{escape(self._printed(show_besides))}</pre>"
+
+    def _printed(self, what: Callable[[Prepared, Console, str], None]) -> str:
         console = Console(
             file=io.StringIO(), width=100, color_system=None, force_jupyter=False, emoji=False
         )
-        show_prepared(self.prepared, console, self.untried)
+        what(self.prepared, console, self.untried)
         text: str = console.file.getvalue()  # type: ignore[attr-defined]
-        return text.rstrip()
-
-    def _repr_html_(self) -> str:
-        return html(self.prepared.equations) + f"<pre>{escape(repr(self))}</pre>"
+        return text.strip()
 
 
 def show(model: Model | str | os.PathLike[str], scene: Scene | None = None) -> Shown:

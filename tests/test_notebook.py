@@ -129,6 +129,22 @@ def test_models_typeset_themselves():
     assert "<math" in shown._repr_html_()
 
 
+@pytest.mark.parametrize(
+    ("formulation", "own"), [("minimal", "Reduced equation"), ("nullspace", "Equations without")]
+)
+def test_show_tells_each_equation_once_in_its_formulation(formulation, own):
+    """The pendulum in x and y: the equations of its formulation stand there as mathematics, and below them
+    the rest as text."""
+    pendulum = load(MODELS / "pendulum.py").model
+    shown = lagfmu.show(pendulum, lagfmu.Scene("Pendulum", formulation=formulation))
+    mathematics, text = shown._repr_html_().split("<pre>")
+    for title in ("Constraints as accelerations", own):
+        assert title in mathematics
+        assert title in repr(shown)
+        assert title not in text
+    assert "Degrees of freedom" in text
+
+
 @pytest.mark.parametrize("words", [["bead"], ["bead.py", "--from", "pendulum"]])
 def test_a_new_model_builds_as_it_is(tmp_path, monkeypatch, words):
     """The commented template and a copy: written once, never over a file, and right at once."""

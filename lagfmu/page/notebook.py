@@ -29,9 +29,9 @@ def latex(thing: Any) -> str:
 
 
 @html.register
-def _(equations: EquationsOfMotion) -> str:
-    parts = [f"<h4>{escape(equations.model.name)}</h4>"]
-    for section in typeset(Form(equations)):
+def _(form: Form) -> str:
+    parts = [f"<h4>{escape(form.equations.model.name)}</h4>"]
+    for section in typeset(form):
         if section.equations:
             rows = "".join(
                 f"<tr><td>{escape(e.label)}</td><td style='text-align:left'>{mathml(e.latex)}</td></tr>"
@@ -39,6 +39,11 @@ def _(equations: EquationsOfMotion) -> str:
             )
             parts.append(f"<p><b>{escape(section.title)}</b></p><table>{rows}</table>")
     return "".join(parts)
+
+
+@html.register
+def _(equations: EquationsOfMotion) -> str:
+    return html(Form(equations))
 
 
 @latex.register

@@ -30,9 +30,13 @@ def show(prepared: Prepared, console: Console, untried: str = "") -> None:
 
     Raises DerivationError if the nonholonomic constraints contradict each other.
     """
-    structure = prepared.structure
     show_equations(prepared, console)
+    show_besides(prepared, console, untried)
 
+
+def show_besides(prepared: Prepared, console: Console, untried: str = "") -> None:
+    """Print all of it but the equations."""
+    structure = prepared.structure
     if prepared.equations.constraints:
         _heading(console, "Classes of constraints")
         _classes(prepared.equations, console)
