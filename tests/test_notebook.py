@@ -135,7 +135,7 @@ def test_models_typeset_themselves():
 def test_show_tells_each_equation_once_in_its_formulation(formulation, own):
     """The pendulum in x and y: the equations of its formulation stand there as mathematics, and below them
     the rest as text."""
-    pendulum = load(MODELS / "pendulum.py").model
+    pendulum = model_file("pendulum").model
     shown = lagfmu.show(pendulum, lagfmu.Scene("Pendulum", formulation=formulation))
     mathematics, text = shown._repr_html_().split("<pre>")
     for title in ("Constraints as accelerations", own):
