@@ -11,6 +11,7 @@ import runpy
 import subprocess
 import sys
 import zipfile
+from math import pi
 from pathlib import Path
 
 import numpy as np
@@ -282,6 +283,37 @@ def test_warnings_are_one_line_each(tmp_path):
     assert printed.count("warning:") == 1
     assert "'again' follows from the others" in printed
     assert "stacklevel" not in printed
+
+
+LIFT = """
+from lagfmu.bodies import Body, Ground, Prismatic, Revolute, mechanism
+
+ground = Ground()
+boom, tube, rod = Body("boom", 500.0, 700.0), Body("tube", 40.0, 4.0), Body("rod", 20.0, 2.0)
+model = mechanism("Lift", plane="xy", bodies=[boom, tube, rod], joints=[
+    Revolute("foot", ground.at((0, 1.5)), boom.at((-2, 0))),
+    Revolute("A", ground.at((0.8, 1.0)), tube.at((-0.6, 0))),
+    Prismatic("L", tube.at((0, 0)), rod.at((0, 0)), axis="x", limits=(0.2, 1.4)),
+    Revolute("B", rod.at((0.5, 0)), boom.at((-0.5, 0.2))),
+], start={"position.L": -2.64})
+"""
+
+
+def test_a_warning_stands_before_the_error_that_follows_from_it(tmp_path):
+    """A cylinder that is assembled the wrong way round, whose limits then cannot be met."""
+    file = tmp_path / "lift.py"
+    file.write_text(LIFT)
+    text = lagfmu("show", file, code=3)
+    assert 0 < text.index("beyond its limits") < text.index("error: model 'Lift' has 1 problem")
+
+
+def test_an_angle_of_a_joint_is_set_in_degrees(native_fmu, tmp_path):
+    """The crank begins at 60 degrees, wherever the model lets it begin."""
+    table = tmp_path / "run.csv"
+    options = "--set", "angle.A=60deg", "--stop-time", "0.01", "--csv", table
+    lagfmu("simulate", native_fmu("SliderCrankBodies"), *options)
+    with table.open() as file:
+        assert float(next(csv.DictReader(file))["angle.A"]) == pytest.approx(pi / 3, rel=1e-13)
 
 
 def test_a_failed_build_says_what_is_wrong_and_leaves_no_folder(tmp_path):

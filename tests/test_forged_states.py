@@ -204,6 +204,16 @@ def test_a_coordinate_is_a_number(library):
     assert any("coordinates" in text for text in said)
 
 
+def test_a_start_by_a_joint_coordinate_is_a_number(library):
+    """NaN in place of the angle that was set, which no coordinate has yet."""
+    one = library("SliderCrankBodies")()
+    one.set("angle.A", 2.2)
+    saved, value = one.bytes_of(one.saved()), struct.pack("=d", 2.2)
+    places = [k for k in range(HEAD, len(saved) - 7, 8) if saved[k : k + 8] == value]
+    (said,) = reasons(one, saved, places, struct.pack("=d", math.nan))
+    assert "start values" in said
+
+
 def test_an_estimated_motion_has_no_more_points_than_there_is_room_for(built, library):
     """One point more is kept at each step, up to four; five are refused."""
     place, drive = dynamicsymbols("x u")

@@ -22,6 +22,7 @@ from sympy.core.function import AppliedUndef
 from ..errors import LagfmuWarning, ModelError
 from ..model.elements import Contact, Expr, Holonomic, Nonholonomic, name_of
 from ..model.model import Model
+from ..names import derivative
 from .branches import CLOSED, has_loop, tell_second_branch
 from .draft import Draft
 from .given import Beginning, given_values, known_names
@@ -44,8 +45,9 @@ class GivenStartWarning(LagfmuWarning):
 @np.errstate(all="ignore")  # what is not finite is told
 def assemble(
     draft: Draft, model: Model, parts: Sequence[Any], start: Mapping[str, Any]
-) -> tuple[dict[Expr, float], list[Expr]]:
-    """The start of each coordinate and velocity, in SI, and those of them that nothing given speaks of.
+) -> tuple[dict[Expr, float], list[Expr], dict[str, tuple[float, bool]]]:
+    """The start of each coordinate and velocity, in SI, and those of them that nothing given speaks of; then
+    that of each joint coordinate that is free, and of its rate, and whether it is given.
 
     Raises ModelError if a name is unknown, or the joints cannot be closed.
     """
@@ -103,7 +105,21 @@ def assemble(
         for s, x, least in zip(model.states, (*q, *v), rounding, strict=True)
     }
     said = _spoken_of(model, known, given)
-    return begins, [s for s in model.states if s not in said]
+    left = [s for s in model.states if s not in said]
+    return begins, left, _of_joints(draft, model, given, q, v)
+
+
+def _of_joints(
+    draft: Draft, model: Model, given: Mapping[str, float], q: Array, v: Array
+) -> dict[str, tuple[float, bool]]:
+    """The start of each joint coordinate that no motor prescribes, and of its rate, and whether it is given:
+    then as it is given, but for rounding."""
+    free = {n: of.values[:2] for n, of in draft.relative.items() if n not in draft.driven}
+    rows = Rows(model, [*free.values()])
+    found = dict(zip(free, rows.values(q).tolist(), strict=True))
+    found |= dict(zip(map(derivative, free), rows.rates(q, v).tolist(), strict=True))
+    as_given = {n: given[n] for n, x in found.items() if n in given and math.isclose(x, given[n])}
+    return {n: (as_given.get(n, x), n in given) for n, x in found.items()}
 
 
 def _spoken_of(model: Model, known: Mapping[str, Beginning], given: Iterable[str]) -> set[Expr]:
@@ -286,19 +302,14 @@ def _tell_beyond_limits(model: Model, draft: Draft, parts: Sequence[Any], q: Arr
     for part in parts:
         if getattr(part, "limits", None) is None:
             continue
-        stops = [model.constraint(f"{part.name}.{end}") for end in ("lower", "upper")]
         name = part.measures[0]
-        value, *gaps = Rows(
-            model,
-            [
-                (e, sp.S.Zero)
-                for e in (draft.relative[name].values[0], *(c.expression for c in stops))
-            ],
-        ).values(q)
+        stops = [model.constraint(f"{part.name}.{end}").expression for end in ("lower", "upper")]
+        places = [draft.relative[name].values[0], *stops]
+        value, *gaps = Rows(model, [(place, sp.S.Zero) for place in places]).values(q)
         if min(gaps) < -CLOSED:
             warnings.warn(
-                f"model {model.name!r}: {name} is assembled at {float(value)!r}, beyond its limits: "
-                f"start {name!r} within them, as otherwise it moves to where the joints close, if they do",
+                f"model {model.name!r}: {name} is assembled at {float(value)!r}, beyond its limits: give "
+                f"{name!r} a start within them; without one it is moved to a limit, or the start is refused",
                 GivenStartWarning,
                 stacklevel=5,
             )

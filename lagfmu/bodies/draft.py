@@ -88,6 +88,7 @@ class Draft:
         self.motions: dict[Any, Motion] = {}
         self.wrenches: dict[str, Wrench] = {}
         self.relative: dict[str, Relative] = {}  # by its name, angle.A
+        self.driven: set[str] = set()  # of these what a motor prescribes
         self.wound: set[str] = set()  # angles that something needs over many turns
         self.unwrapped: dict[Expr, tuple[Expr, Expr]] = {}  # in space: rate, and value modulo 2 pi
         self.placed: dict[Marker, Placed] = {}

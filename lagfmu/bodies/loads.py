@@ -192,6 +192,7 @@ class Motor:
             of.drive(draft, effort)
         else:
             effort = multiplier(name)
+            draft.driven.add(of.name)
             where = self._motion(draft, f"{name}.{'angle' if turns else 'position'}", of.unit)
             text = f"motor {name} moves {of.name}"
             draft.constraints.append(Holonomic(name, of.values[0] - where, text))

@@ -116,7 +116,11 @@ def plainly() -> Iterator[None]:
     with _noted(), warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         try:
-            yield
+            try:
+                yield
+            finally:  # before the error that may follow from what they tell
+                for message in dict.fromkeys(str(w.message) for w in caught if _ours(w)):
+                    say(message, "warning:", "yellow", errors)
         except (LagfmuError, OSError) as raised:
             error = raised if isinstance(raised, LagfmuError) else TemporaryFolderError(raised)
             if isinstance(error, UserInterruptError):
@@ -124,9 +128,6 @@ def plainly() -> Iterator[None]:
             else:
                 say_error(str(error))
             raise typer.Exit(code_of(error)) from None
-        finally:
-            for message in dict.fromkeys(str(w.message) for w in caught if _ours(w)):
-                say(message, "warning:", "yellow", errors)
 
 
 def _ours(warning: Any) -> bool:

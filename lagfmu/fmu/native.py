@@ -126,13 +126,14 @@ def sources_of(prepared: Prepared, listed: bool = True, face: Face = USUAL) -> S
     everything = runtime_files()
     integrators = held(scene, form)
     dae = bool(table.those(names.RESIDUAL_RATE))
-    gone = files_left_out(scene, system, integrators, bool(table.measured), dae)
+    measured, joints = bool(table.measured), bool(form.joint_coordinates)
+    gone = files_left_out(scene, system, integrators, measured, dae, joints)
     generated = {
         "model.c": model_source(
             form, needs_tangents(scene, system), frozenset(table.varied)
         ).encode(),
         "variables.c": variables_source(table, form, scene, system).encode(),
-        "optional.c": optional_source(scene, system, integrators, bool(table.measured)).encode(),
+        "optional.c": optional_source(scene, system, integrators, measured, joints).encode(),
     }
     gone |= generated.keys() | {file for file in everything if not face.holds(file)}
     if face.fmi == 3:

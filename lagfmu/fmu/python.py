@@ -14,6 +14,7 @@ import pythonfmu
 from .. import names
 from ..errors import BuildError
 from ..interface.variables import Variable, VariableTable
+from ..mechanics.joint_coordinates import start_names
 from ..methods import IN_PYTHON, NUMBERS
 from ..numeric.closed import OPERATIONS
 from ..prepare.prepare import Prepared
@@ -140,6 +141,7 @@ def offered(prepared: Prepared) -> VariableTable:
             f"--target native{f' ({missing})' * bool(missing)}"
         )
     table = prepared.table.without(names.STEP)  # no method of this target has a fixed step
+    table = table.calculating(start_names(prepared.coded.joint_coordinates))
     return table.offering([m for m in prepared.scene.selectable if m in IN_PYTHON])
 
 

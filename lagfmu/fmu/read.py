@@ -104,6 +104,12 @@ def has_error_bars(variables: Sequence[Any]) -> bool:
     return any(names.barred(n) in known for n in known)
 
 
+def is_joint_start(description: Any, name: str) -> bool:
+    """True of a start value that is no state's: of the angle of a joint, which speaks for coordinates."""
+    states = {u.variable.derivative.name for u in description.derivatives}
+    return bool(states) and name not in states
+
+
 def described_rules(description: Any) -> dict[str, Rule]:
     """What the variables of an FMU may be set to, by name."""
     return {v.name: _rule(v) for v in description.modelVariables}

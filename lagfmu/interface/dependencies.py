@@ -27,7 +27,7 @@ class Dependencies:
 
     def __init__(self, form: Form) -> None:
         eom, self.reduction, self.stepped = form.equations, form.reduction, form.stepped
-        self.eom = eom
+        self.eom, self.joint_coordinates = eom, form.joint_coordinates
         self.states = [str(s) for s in (*self.stepped.q, *self.stepped.v)]
         hidden = {eom.u[eom.u.index(u) + k]: u for u in eom.estimated for k in (1, 2, 3)}
         self.into = hidden  # they follow from the values of the motion itself

@@ -14,6 +14,7 @@ import sympy as sp
 
 from .. import names
 from ..mechanics.equations import symbols_of
+from ..mechanics.joint_coordinates import start_names
 from ..model.elements import Constraint, Expr
 from ..model.model import Contact, Nonholonomic, name_of
 from ..model.selection import select
@@ -133,7 +134,8 @@ class Outputs:
             if of.name not in speeds:
                 unit, behind = self.units[of.name], self.behind.symbols(rate)
                 text = f"velocity of: {text}"
-                variables.append(self.output(of, text, unit, behind, "Real", str(q)))
+                made = self.output(of, text, unit, behind, "Real", str(q))
+                variables.append(self._startable(made))
         for i, v in enumerate(eom.v):
             of = names.read(str(v))
             kind, of_what = ("coordinate", of.coordinate) if of.order else ("speed", None)
@@ -169,6 +171,17 @@ class Outputs:
             depends=(name,),
             depends_initially=self.behind.at_start([name]) if approx else (),
         )
+
+    def _startable(self, v: Variable) -> Variable:
+        """With a start, where it is a joint coordinate, or the rate of one, that an importer may set."""
+        if v.name not in self._joint_starts:
+            return v
+        start, given = self.model.joint_starts[v.name]
+        return dataclasses.replace(v, role="start", initial="approx", start=start, given=given)
+
+    @cached_property
+    def _joint_starts(self) -> set[str]:
+        return {*start_names(self.behind.joint_coordinates)}
 
     def _place(self, v: Variable) -> int:
         """Where the coordinate stands in the model; those of an embedding come last."""
@@ -237,7 +250,8 @@ class Outputs:
             symbols = one_of(own, {solved[s] for s in found & solved.keys()})
             text = o.description or f"output {o.name}"
             unit = parse_unit(o.unit, o.name)
-            variables.append(self.output(Subject(names.OWN, "", o.name), text, unit, symbols))
+            made = self.output(Subject(names.OWN, "", o.name), text, unit, symbols)
+            variables.append(self._startable(made))
             if o.unique:
                 text = f"true where the multipliers leave {o.name} one value"
                 of = Subject(names.UNIQUE, o.name)

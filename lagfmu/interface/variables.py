@@ -139,6 +139,12 @@ class VariableTable:
         offered = {"description": described(methods), "items": tuple(methods)}
         return self._changed({v.name: offered for v in self.those(names.METHOD)})
 
+    def calculating(self, calculated: Collection[str]) -> VariableTable:
+        """The same, where these have no start, but for the states."""
+        found = {n for n in calculated if n in self and n not in self.states}
+        said = {"role": "output", "initial": "calculated", "start": None, "given": False}
+        return self._changed(dict.fromkeys(found, said))
+
     def _changed(self, fields: Mapping[str, Mapping[str, Any]]) -> VariableTable:
         """The same, where variables of these names have other fields."""
         variables = (replace(v, **fields.get(v.name, {})) for v in self.variables)

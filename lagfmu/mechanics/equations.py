@@ -33,6 +33,7 @@ from ..model.units import Unit
 from ..names import derivative, rate_of, read
 from .attitudes import attitudes
 from .formulations.multipliers import multipliers
+from .joint_coordinates import JointCoordinate, joint_coordinates
 from .kinematics import Kinematics
 
 TIME = dynamicsymbols._t
@@ -188,6 +189,11 @@ class EquationsOfMotion(Displayed):
         """The angles that equal an expression modulo 2 pi, by their place in q."""
         given = {self.symbols[s]: self.plain(e) for s, e in self.model.unwrapped.items()}
         return {j: given[s] for j, s in enumerate(self.q) if s in given}
+
+    @cached_property
+    def joint_coordinates(self) -> tuple[JointCoordinate, ...]:
+        """Those by which an importer may give the start."""
+        return joint_coordinates(self.model, self.q, self.outputs)
 
     @cached_property
     def quaternions(self) -> tuple[tuple[int, int, int, int], ...]:

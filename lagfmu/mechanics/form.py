@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from .equations import EquationsOfMotion
 from .formulations.minimal import Reduction
+from .joint_coordinates import JointCoordinate
 
 
 @dataclass(frozen=True)
@@ -16,6 +17,11 @@ class Form:
     equations: EquationsOfMotion
     reduction: Reduction | None = None
     formulation: str = "multipliers"
+
+    @property
+    def joint_coordinates(self) -> tuple[JointCoordinate, ...]:
+        """Those by which an importer may give the start: where all coordinates are stepped."""
+        return self.equations.joint_coordinates if self.reduction is None else ()
 
     @property
     def stepped(self) -> EquationsOfMotion:

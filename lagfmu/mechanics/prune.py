@@ -24,6 +24,7 @@ from ..names import derivative
 from .coupling import coupled
 from .equations import EquationsOfMotion, symbols_of
 from .form import Form
+from .joint_coordinates import start_names
 
 Indices = frozenset[int]
 SOLVED = {names.MULTIPLIER, names.UNIQUE, names.RESIDUAL, names.FORCE}  # from the full equations
@@ -221,6 +222,9 @@ def silent(eom: EquationsOfMotion, outputs: Collection[str]) -> EquationsOfMotio
 def own(eom: EquationsOfMotion, outputs: Collection[str]) -> tuple[Output, ...]:
     """The model's own outputs that are read, or of which it is read whether they are unique."""
     asked = {*outputs, *names.constraints(outputs, names.UNIQUE)}
+    asked |= {
+        n for c in eom.joint_coordinates if {*start_names([c])} & asked for n in start_names([c])
+    }
     return tuple(o for o in eom.outputs if o.name in asked)
 
 

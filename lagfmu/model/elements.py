@@ -177,6 +177,7 @@ class ModelFields:
     inputs: Sequence[Input] = ()
     start: Mapping[Expr, Expr] = field(default_factory=dict)
     rough: Sequence[Expr] = ()
+    joint_starts: Mapping[str, tuple[float, bool]] = field(default_factory=dict)
     embedding: Embedding | None = None
     description: str = ""
     descriptions: Mapping[Expr, str] = field(default_factory=dict)

@@ -103,9 +103,17 @@ class Model(ModelFields, Displayed):
         if problems:
             raise ModelError(str(self.name), problems)
 
-    def started(self, start: Mapping[Expr, float], rough: Sequence[Expr]) -> Model:
-        """The same that starts at these numbers, finite and in SI; nothing is checked again."""
+    def started(
+        self,
+        start: Mapping[Expr, float],
+        rough: Sequence[Expr],
+        joint_starts: Mapping[str, tuple[float, bool]],
+    ) -> Model:
+        """The same that starts at these numbers, finite and in SI; nothing is checked again.  `joint_starts`:
+        where outputs and unwrapped angles, with their rates, begin by which importers may give the start
+        too, and whether `start` names them."""
         made = copy(self)
+        object.__setattr__(made, "joint_starts", dict(joint_starts))
         object.__setattr__(made, "start", dict(start))
         object.__setattr__(made, "rough", tuple(rough))
         return made

@@ -29,6 +29,7 @@ DERIVATIVES = (
 SLIDING = "sliding_along.c"  # behind OPTIONAL, of both
 BEHIND_BOTH = "extreme.c"
 MOTIONS = ("prescribed.c", "rates.c")  # behind PRESCRIBED of variables.c
+JOINT_START = ("joint_coordinates.c", "joint_start.c")  # behind JOINT_START
 ALGEBRAIC = "algebraic.c"  # behind ALGEBRAIC of variables.c
 FRICTION = (  # behind FRICTION_EVENTS
     *("friction_events.c", "frictional_impact.c", "nonunique.c", "norms.c"),
@@ -69,9 +70,14 @@ def held(scene: Scene, form: Form) -> tuple[str, ...]:
 
 
 def optional_source(
-    scene: Scene, system: System, found: tuple[str, ...], peaks: bool = False
+    scene: Scene,
+    system: System,
+    found: tuple[str, ...],
+    peaks: bool = False,
+    joints: bool = False,
 ) -> str:
-    """C text that defines OPTIONAL; `found` are the integrators; `peaks`: extremes are kept."""
+    """C text that defines OPTIONAL; `found` are the integrators; `peaks`: extremes are kept; `joints`: joint
+    coordinates may be given at the start."""
     contacts = bool(system.contacts or system.frictions)
     menu = {m: m for m in found}
     if "auto" in scene.selectable:
@@ -89,6 +95,7 @@ def optional_source(
     rows += ["    .variation = &VARIATION,\n"] if scene.sensitivities else []
     if scene.sensitivities and system.frictions:
         rows.append("    .sliding_along = sliding_along,\n")
+    rows += ["    .joints = &JOINT_START,\n"] if joints else []
     what = ", ".join(found) + (", contacts" if contacts else "")
     what += ", frictions" if system.frictions else ""
     what += ", error bars" if scene.error_bars else ""
@@ -114,9 +121,10 @@ def files_left_out(
     found: tuple[str, ...],
     peaks: bool = False,
     dae: bool = False,
+    joints: bool = False,
 ) -> frozenset[str]:
     """The runtime's files that the FMU does without; as `optional_source`; `dae`: an importer may solve
-    for the multipliers."""
+    for the multipliers; `joints`: joint coordinates may be given at the start."""
     gone = {f"{m}.c" for m in INTEGRATORS if m not in found}
     if not dae:
         gone.add(ALGEBRAIC)
@@ -130,6 +138,8 @@ def files_left_out(
         gone.add(SLIDING)
     if not peaks:
         gone.add(PEAKS)
+    if not joints:
+        gone |= {*JOINT_START}
     if not _may_pass(system):
         gone.add(PASSAGE)
     if {PEAKS, PASSAGE} <= gone:

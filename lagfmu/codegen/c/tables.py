@@ -72,8 +72,9 @@ class Tables:
         own, more = self._outputs(functions)
         reach, ends = self._lookups(functions)
         kinematics, moving = self._kinematics(functions)
-        tables += [own, reach, kinematics]
-        more |= ends | moving
+        begins, joints = self._joints()
+        tables += [own, reach, kinematics, begins]
+        more |= ends | moving | joints
         if "starts" in functions:
             started = list(parts.formulas)
             tables.append(self._integers("started", started))
@@ -154,6 +155,15 @@ class Tables:
             text += self._integers("unique_output", unique)
             fields |= {"unique_count": len(unique), "unique_output": "unique_output"}
         return text, fields
+
+    def _joints(self) -> tuple[str, dict[str, Any]]:
+        """The joint coordinates by which a start may be given, and the System's fields for them."""
+        joints = self.eom.joint_coordinates
+        if not joints or self.prefix or self.parts.reduction is not None:
+            return "", {}
+        items = [f'{{"{c.name}", {", ".join(str(int(x)) for x in c[1:])}}}' for c in joints]
+        text = self._array("const JointCoordinate", "joints", items)
+        return text, {"joint_count": len(joints), "joint": "joints"}
 
     def _lookups(self, functions: Collection[str]) -> tuple[str, dict[str, Any]]:
         """The names and ends of the tables that are looked up, and the System's fields for them."""

@@ -12,6 +12,7 @@ from ... import names
 from ...interface.rules import CALCULATED
 from ...interface.variables import Variable, VariableTable
 from ...mechanics.form import Form
+from ...mechanics.joint_coordinates import start_names
 from ...model.scene import Scene
 from ...numeric.system import NONHOLONOMIC, System
 from .printer import string
@@ -65,7 +66,8 @@ def variables_source(table: VariableTable, form: Form, scene: Scene, system: Sys
     """C text that defines VARIABLES and the defaults of the scene."""
     eom, stepped = form.equations, form.stepped
     place = Places(system, [str(s) for s in eom.u], [str(s) for s in eom.p])
-    states = {str(s): j for j, s in enumerate((*stepped.q, *stepped.v))}
+    starts = [*stepped.q, *stepped.v, *start_names(form.joint_coordinates)]
+    states = {str(s): j for j, s in reversed([*enumerate(starts)])}  # a joint coordinate may be one
     position = {v.name: k for k, v in enumerate(table.variables)}
     number = {v.name: k for k, v in enumerate(v for v in table.variables if v.bar_of)}
     peaks = {name: k for k, name in enumerate(table.measured)}

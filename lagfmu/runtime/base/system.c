@@ -7,7 +7,8 @@
 static int is_own(const System *s, int i) { return s->own_speed != NULL && s->own_speed[i]; }
 
 StateName system_state_name(const System *s, int j) {
-    const int i = j - s->nq;
+    const int i = j - s->nq, k = j - system_states(s);
+    if (k >= 0) return (StateName){k % 2 ? "der(" : "", s->joint[k / 2].name, k % 2 ? ")" : ""};
     if (i < 0) return (StateName){"", s->coordinates[j], ""};
     if (is_own(s, i)) return (StateName){"", s->speeds[i], ""};
     return (StateName){"der(", s->speeds[i], ")"};

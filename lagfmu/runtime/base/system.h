@@ -43,6 +43,14 @@ typedef struct {
     int first, normals, gated;
 } Friction;
 
+/* What a joint leaves free, where a start may be given: its value and its rate are outputs of the model's own, or
+ * `coordinate` is it, with its rate; otherwise that is -1.  within_turn: known modulo 2 pi alone. */
+typedef struct {
+    const char *name;
+    int coordinate, value, rate;
+    int within_turn;
+} JointCoordinate;
+
 typedef struct System System;
 
 struct System {
@@ -113,6 +121,8 @@ struct System {
     int started_count;
     const int *started;
     void (*starts)(const double *p, double *w);
+    int joint_count;               /* 0 and NULL without */
+    const JointCoordinate *joint;  /* (joint_count) */
     /* The derivative of all of these along the direction (dt, dq, dv, du, dp): what changes in the values
      * when the state moves that way.  dM (masses), dF (nv), dG (entries), dnu, dgamma, df (m),
      * denergy (2).  NULL where nobody asks for derivatives; dp is read where a run's are asked for. */
@@ -171,7 +181,10 @@ struct System {
 /* The state that is stepped: y = (q, v), v = y + nq. */
 static inline int system_states(const System *s) { return s->nq + s->nv; }
 
-/* The name of y[j], in three parts: x, der(x), or that of a speed of its own. */
+/* What start values are of: y, then the value and the rate of each joint coordinate. */
+static inline int system_starts(const System *s) { return system_states(s) + 2 * s->joint_count; }
+
+/* The name of one of these, in three parts: x, der(x), or that of a speed of its own. */
 typedef struct {
     const char *head, *name, *tail;
 } StateName;

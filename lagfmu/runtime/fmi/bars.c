@@ -203,7 +203,7 @@ static double natural_size(const Instance *x, const Variable *of) {
     const Observed *o = &x->seen;
     const double *push = x->bars->push;
     double size = HUGE_VAL;
-    if (of->state >= 0) return x->bars->scale[of->state];
+    if (variable_state(of) >= 0) return x->bars->scale[variable_state(of)];
     if (of->place == AT_QDOT) return size_of_rate(x, of->index);
     if (of->place == AT_FORCE) return push[of->index];
     if (of->place == AT_SHARE) return push[full->entry_column[of->index]];

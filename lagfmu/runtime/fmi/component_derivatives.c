@@ -9,7 +9,7 @@
 /* Adds a known variable's change to the direction; 0 if it is neither time nor a state nor an input, nor a multiplier
  * that is given. */
 static int add_seed(Instance *x, double *dt, const Variable *v, double change) {
-    const int nq = MODEL_SYSTEM->nq;
+    const int nq = MODEL_SYSTEM->nq, j = variable_state(v);
     Sensitivity *w = &x->solver.sensitivity;
     if (v->place == AT_TIME)
         *dt += change;
@@ -17,12 +17,10 @@ static int add_seed(Instance *x, double *dt, const Variable *v, double change) {
         w->du[v->index] += change;
     else if (v->place == AT_LAMBDA && x->imposed)
         w->dgiven[v->index] += change;
-    else if (v->role == ROLE_START && v->state < nq)
-        w->dq[v->state] += change;
-    else if (v->role == ROLE_START)
-        w->dv[v->state - nq] += change;
-    else
+    else if (j < 0)
         return 0;
+    else
+        *(j < nq ? &w->dq[j] : &w->dv[j - nq]) += change;
     return 1;
 }
 

@@ -31,12 +31,13 @@ void instance_layout(Instance *x, Arena *arena) {
         solver_layout(&x->solver, &saved, &scratch, system);
         x->q0 = arena_doubles(&saved, system->nq);
         x->v0 = arena_doubles(&saved, system->nv);
+        x->joint0 = arena_doubles(&saved, 2 * system->joint_count);
         x->expected = arena_doubles(&saved, system->inputs);
         x->set = arena_ints(&saved, system->inputs);
         x->multiplier = arena_doubles(&saved, ALGEBRAIC != NULL ? system->m : 0);
         x->past = arena_take(&saved, (size_t)system->estimated_count, sizeof *x->past);
-        x->priority = arena_take(&scratch, (size_t)system_states(system), sizeof *x->priority);
-        x->begin = arena_doubles(&scratch, system_states(system));
+        x->priority = arena_take(&scratch, (size_t)system_starts(system), sizeof *x->priority);
+        x->begin = arena_doubles(&scratch, system_starts(system));
         x->formula = arena_doubles(&scratch, system->started_count);
         for (int k = 0; k < EVENT_KINDS; k++)
             x->before[k] = arena_take(&scratch, (size_t)event_count_of(system, (EventKind)k), sizeof(Count));

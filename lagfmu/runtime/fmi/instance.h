@@ -54,8 +54,9 @@ typedef struct Instance {
     int observed, evaluated;
     int followed;           /* 1: the state goes with a motion that was set; as it was in `backup` */
     double *q0, *v0;        /* (nq), (nv) start values as they were set */
-    Priority *priority;     /* (states) who said them; found anew at each start */
-    double *begin;          /* (states) the start values then, with those that follow from parameters */
+    double *joint0;         /* (2 joint_count) those of joint coordinates and their rates */
+    Priority *priority;     /* (system_starts()) who said them; found anew at each start */
+    double *begin;          /* (system_starts()) the start values then, with those that follow from parameters */
     double *formula;        /* (started_count of the system) these */
     double *expected;       /* (inputs) values at the end of the latest step */
     int *set;               /* (inputs) 1: set since the latest step */

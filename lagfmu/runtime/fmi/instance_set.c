@@ -18,10 +18,16 @@ int instance_was_set(const Instance *x, const Variable *v, double *value) {
     }
 }
 
+/* Where the start value is kept. */
+static double *start_place(const Instance *x, int j) {
+    const System *s = x->solver.system;
+    if (j < s->nq) return &x->q0[j];
+    return j < system_states(s) ? &x->v0[j - s->nq] : &x->joint0[j - system_states(s)];
+}
+
 double instance_setting(const Instance *x, const Variable *v) {
-    const int nq = x->solver.system->nq;
     double value = 0;
-    if (v->role == ROLE_START) return v->state < nq ? x->q0[v->state] : x->v0[v->state - nq];
+    if (v->role == ROLE_START) return *start_place(x, v->state);
     (void)instance_was_set(x, v, &value);
     return value;
 }
@@ -69,7 +75,6 @@ void instance_set(Instance *x, const Variable *v, double value) {
         ALGEBRAIC->set(x, v, value);
         return;
     }
-    const int nq = x->solver.system->nq;
     if (v->place == AT_INPUT) {
         set_input(x, v->index, value);
         if (!x->running) x->started = x->observed = 0;
@@ -77,10 +82,7 @@ void instance_set(Instance *x, const Variable *v, double value) {
     }
     x->started = x->observed = x->evaluated = 0;
     if (v->role == ROLE_START) {
-        if (v->state < nq)
-            x->q0[v->state] = value;
-        else
-            x->v0[v->state - nq] = value;
+        *start_place(x, v->state) = value;
         return;
     }
     switch (v->place) {

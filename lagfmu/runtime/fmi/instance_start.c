@@ -51,6 +51,7 @@ static void tell_left_out(const Telling *told) {
 
 /* A start value that differs from the described one was set, whatever calls set it. */
 static void find_priorities(Instance *x) {
+    for (int j = 0; j < system_starts(x->solver.system); j++) x->priority[j] = OMITTED;
     for (int k = 0; k < VARIABLE_COUNT; k++) {
         const Variable *v = &VARIABLES[k];
         if (v->role != ROLE_START) continue;
@@ -64,6 +65,7 @@ static Status find_begin(Instance *x) {
     Solver *s = &x->solver;
     const System *system = s->system;
     state_gather(system, x->q0, x->v0, x->begin);
+    memcpy(x->begin + system_states(system), x->joint0, (size_t)(2 * system->joint_count) * sizeof *x->begin);
     if (system->started_count > 0) system->starts(s->p, x->formula);
     for (int i = 0; i < system->started_count; i++) {
         const int j = system->started[i];
@@ -77,6 +79,13 @@ static Status find_begin(Instance *x) {
         x->begin[j] = x->formula[i];
     }
     return OK;
+}
+
+static Status start_from_begin(Instance *x, Moved moved, void *context) {
+    Solver *s = &x->solver;
+    if (OPTIONAL.joints != NULL)
+        return OPTIONAL.joints->start(s, x->start_time, x->begin, x->priority, moved, context);
+    return solver_start(s, x->start_time, x->begin, x->begin + s->system->nq, x->priority, moved, context);
 }
 
 static void choose_settings(Instance *x) {
@@ -111,7 +120,6 @@ void instance_warn_of_shares(Instance *x) {
 }
 
 Status instance_start_again(Instance *x, int state, double part) {
-    Solver *s = &x->solver;
     if (find_begin(x) != OK) return FAILED;
     Priority held = OMITTED;
     if (state >= 0) {
@@ -119,7 +127,7 @@ Status instance_start_again(Instance *x, int state, double part) {
         held = x->priority[state];
         x->priority[state] = SET;
     }
-    const Status status = solver_start(s, x->start_time, x->begin, x->begin + s->system->nq, x->priority, NULL, NULL);
+    const Status status = start_from_begin(x, NULL, NULL);
     if (state >= 0) x->priority[state] = held;
     return status;
 }
@@ -127,9 +135,8 @@ Status instance_start_again(Instance *x, int state, double part) {
 static Status find_start(Instance *x) {
     Solver *s = &x->solver;
     if (find_begin(x) != OK) return FAILED;
-    const double *q0 = x->begin, *v0 = q0 + s->system->nq;
     Telling told = {.x = x};
-    if (solver_start(s, x->start_time, q0, v0, x->priority, tell_moved, &told) != OK) return FAILED;
+    if (start_from_begin(x, tell_moved, &told) != OK) return FAILED;
     tell_left_out(&told);
     /* model exchange has no communication step: 1 s stands in for it */
     if (x->exchange && nominals_incomplete(s) &&

@@ -28,7 +28,7 @@ enum { FLAG, COUNT, TALLY, SIZE, LIMIT, FINITE };
 
 /* How many of them there are; more than ONE stand behind a pointer. */
 enum {
-    ONE, COORDINATES, SPEEDS, STATES, ROWS, CONTACTS, CONTACTS_COORDINATES, CONTACTS_SPEEDS, FRICTIONS,
+    ONE, COORDINATES, SPEEDS, STATES, JOINT_STARTS, ROWS, CONTACTS, CONTACTS_COORDINATES, CONTACTS_SPEEDS, FRICTIONS,
     FRICTIONS_COORDINATES, FRICTIONS_SPEEDS, INPUTS, SWITCH_STATES, PARAMETERS, PEAKS_KEPT, WATCHED, DENSE,
     STEPPED, VARIATIONS, VARIED, GIVEN_ROWS
 };
@@ -142,6 +142,7 @@ static const Saved OF_INSTANCE[] = {
     INSTANCE("inputs", expected, FINITE, INPUTS),
     INSTANCE("start values", q0, FINITE, COORDINATES),
     INSTANCE("start values", v0, FINITE, SPEEDS),
+    INSTANCE("start values", joint0, FINITE, JOINT_STARTS),
 };
 
 Status restored_none(Instance *x, const char *name, double value) {
@@ -166,6 +167,7 @@ static Status each(Instance *x, const Solver *s, const void *base, const Saved *
                         [COORDINATES] = nq,
                         [SPEEDS] = nv,
                         [STATES] = nq + nv,
+                        [JOINT_STARTS] = 2 * system->joint_count,
                         [ROWS] = system->m,
                         [CONTACTS] = system->contacts,
                         [CONTACTS_COORDINATES] = system->contacts * nq,

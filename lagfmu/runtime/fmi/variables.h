@@ -53,7 +53,7 @@ typedef struct Variable {
     Role role;
     Place place;
     int index, contact;
-    int state;       /* role START: j of y = (q, v) of the stepped system; -1 */
+    int state;       /* role START: its number among start values (system_starts()); -1 */
     double start;    /* of what can be set; of AT_METHOD a MethodName */
     double min, max; /* -HUGE_VAL, HUGE_VAL where there is none */
     int positive;    /* zero is refused */
@@ -80,5 +80,10 @@ SHARED const char *const MODEL_IDENTIFIER, *const MODEL_GUID;
 SHARED const double DEFAULT_TOLERANCE;
 SHARED const int DEFAULT_METHOD;               /* MethodName */
 SHARED const int EXCHANGE_LOST;                /* 1: the energy dissipated is the last continuous state */
+
+/* j of y = (q, v) of the stepped system; -1 of what is no state. */
+static inline int variable_state(const Variable *v) {
+    return v->role == ROLE_START && v->state < system_states(MODEL_SYSTEM) ? v->state : -1;
+}
 
 #endif

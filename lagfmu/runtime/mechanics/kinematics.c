@@ -14,8 +14,7 @@
 #include <string.h>
 
 #include "mechanism.h"
-
-static const double TURN = 6.283185307179586477;
+#include "numbers.h"
 
 /* The columns of B, whose list goes by rows; and which coordinates are unwrapped. */
 static void find_tables(Mechanism *b) {

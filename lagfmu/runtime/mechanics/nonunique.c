@@ -10,6 +10,7 @@
 #include <string.h>
 
 #include "friction.h"
+#include "numbers.h"
 
 static const double NONUNIQUE_DEPENDENT = 1e-9; /* of a row's norm, left over by the others: nothing */
 static const double NONUNIQUE_WIDE = 1e2;       /* times the forces at work: how far is looked */
@@ -29,16 +30,6 @@ typedef struct {
     double *slope, *g, *Pg; /* (count) */
     double *P;            /* (count, count) */
 } Nonunique;
-
-static double dot(int count, const double *a, const double *b) {
-    double sum = 0;
-    for (int i = 0; i < count; i++) sum += a[i] * b[i];
-    return sum;
-}
-
-static void add_part(int count, double part, const double *a, double *to) {
-    for (int i = 0; i < count; i++) to[i] += part * a[i];
-}
 
 static void orthonormalize(Nonunique *x) {
     const int m = x->b->system->m;

@@ -20,6 +20,9 @@ SHARED Status initial_refused(Solver *s);
 /* f = 0 on the rows: q (nq) is moved.  `rows` (m) loses those that are nonholonomic. */
 SHARED Status initial_positions(const Start *x, double *q, int *rows);
 
+/* initialization.c -- `moved` for each value of x->q0 and x->v0 that the state of the solver does not have. */
+SHARED void initial_moved(const Start *x, Moved moved, void *context);
+
 /* G v = nu at q on the rows: v (nv), from x->v0, as near as can be.  least (nv) >= 0: speeds below which
  * nothing counts. */
 SHARED Status initial_velocities(const Start *x, const double *q, const double *least, const int *rows, double *v);

@@ -205,7 +205,7 @@ static Status find_nominals(const Start *x) {
     return nominals_complete(s, x->at, 0);
 }
 
-static void tell_each_moved(const Start *x, Moved moved, void *context) {
+void initial_moved(const Start *x, Moved moved, void *context) {
     const State *state = &x->s->state;
     const int nq = x->s->system->nq;
     for (int i = 0; i < system_states(x->s->system); i++) {
@@ -259,6 +259,6 @@ Status solver_start(Solver *s, double t, const double *q0, const double *v0, con
     if (find_modes(&x) == FAILED) return FAILED;
     for (int c = 0; c < s->system->contacts; c++) s->state.armed[c] = !s->state.closed[c];
     if (find_nominals(&x) == FAILED) return FAILED;
-    if (moved != NULL) tell_each_moved(&x, moved, context);
+    if (moved != NULL) initial_moved(&x, moved, context);
     return OK;
 }

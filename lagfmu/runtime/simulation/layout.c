@@ -89,6 +89,7 @@ void solver_layout(Solver *s, Arena *saved, Arena *scratch, const System *system
     }
     s->work_gap = arena_doubles(scratch, minimum_gap_doubles(system));
     if (s->columns > 0) OPTIONAL.variation->layout(s, scratch);
+    if (system->joint_count > 0) OPTIONAL.joints->layout(s, scratch);
     const int frictions = system->frictions, some = frictions > 0;
     s->work_frictional = arena_take(scratch, some ? OPTIONAL.friction->doubles(system) : 0, sizeof(double));
     s->iwork_frictional = arena_take(scratch, some ? OPTIONAL.friction->ints(system) : 0, sizeof(int));

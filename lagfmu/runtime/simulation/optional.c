@@ -22,4 +22,5 @@ SHARED_VALUE const Optional OPTIONAL = {
     .friction = &FRICTION_EVENTS,
     .variation = &VARIATION,
     .sliding_along = sliding_along,
+    .joints = &JOINT_START,
 };

@@ -7,6 +7,7 @@
 
 #include "contacts.h"
 #include "events.h"
+#include "joint_start.h"
 #include "impact.h"
 #include "switches.h"
 #include "linkage.h"
@@ -46,6 +47,8 @@ typedef struct {
     const Variation *variation;
     /* Of these with frictions; else NULL. */
     Status (*sliding_along)(Sensitivity *w, Mechanism *b, Instant at, const double *q, const double *v, Direction d);
+    /* Of starts by joint coordinates; NULL where there are none. */
+    const JointStart *joints;
 } Optional;
 
 SHARED const Optional OPTIONAL;

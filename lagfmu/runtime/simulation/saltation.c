@@ -292,7 +292,8 @@ Status saltation_start(Solver *s, Map map, void *context) {
     x->ended.text[0] = '\0';
     memset(x->columns, 0, (size_t)(s->columns * column_size(s->system)) * sizeof *x->columns);
     for (int c = 0; c < s->columns; c++)
-        if (s->column[c].state >= 0) x->columns[c * column_size(s->system) + s->column[c].state] = 1;
+        if (s->column[c].state >= 0 && s->column[c].state < system_states(s->system))
+            x->columns[c * column_size(s->system) + s->column[c].state] = 1;
     const Status status = find_columns(s, &jump);
     *s->state.varied = 1;
     if (status == OK)

@@ -77,6 +77,7 @@ typedef struct Solver {
     /* scratch, nothing of which is kept from one call to the next: */
     int *active_full;          /* (m of full) rows that act there */
     double *work_initial;      /* (6 nq + 3 m) of initialization.c, initial_projection.c and nominals.c */
+    struct JointSearch *joint_search; /* of joint_start.c */
     int *iwork_initial;        /* (2 m + contacts) */
     double *work_contacts;     /* (2 nv + 3 m) of contacts.c */
     int *iwork_contacts;       /* (m + 2 contacts) */

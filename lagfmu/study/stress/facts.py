@@ -10,7 +10,14 @@ from typing import Any
 from ... import names
 from ...errors import VerificationError
 from ...fmu.closed_forms import CarriedForm, unpack_closed_forms
-from ...fmu.read import experiment_of, file_stem, kind_of, read_description, target_in
+from ...fmu.read import (
+    experiment_of,
+    file_stem,
+    is_joint_start,
+    kind_of,
+    read_description,
+    target_in,
+)
 from ...methods import integrators
 from ...verification.verify import closed_forms_in
 
@@ -130,7 +137,11 @@ def facts_of(path: Path) -> Facts:
             for v in reals
             if v.causality == "parameter" and names.read(v.name).head != names.SOLVER
         ),
-        starts=tuple(_settable(v) for v in reals if v.name in moving and v.start is not None),
+        starts=tuple(
+            _settable(v)
+            for v in reals
+            if v.name in moving and v.start is not None and not is_joint_start(description, v.name)
+        ),
         inputs=tuple(_settable(v) for v in reals if v.causality == "input"),
         motions=_motions([*inputs, *estimated]),
         estimated=estimated,

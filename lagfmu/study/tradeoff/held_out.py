@@ -10,7 +10,7 @@ import numpy as np
 
 from ... import names
 from ...errors import SimulationError
-from ...fmu.read import Trajectory, kind_of
+from ...fmu.read import Trajectory, is_joint_start, kind_of
 from ...fmu.session import Session
 from .observe import observe
 from .reference import Reference, refer
@@ -70,7 +70,13 @@ def _drawn(session: Session, scene: Trajectory, chance: random.Random) -> dict[s
         if kind_of(v) == "Real" and v.start is not None and names.read(v.name).head != names.SOLVER
     ]
     outputs = scene.dtype.names or ()
-    starts = [v for v in given if v.initial in ("exact", "approx") and v.name in outputs]
+    starts = [
+        v
+        for v in given
+        if v.initial in ("exact", "approx")
+        and v.name in outputs
+        and not is_joint_start(session.description, v.name)
+    ]
     still = all(float(v.start) == 0 for v in starts)
     values: dict[str, float] = {}
     for v in given:

@@ -1,0 +1,189 @@
+/* joint_start.c -- a start by joint coordinates, from that without them: by damped Newton's method, whose steps
+ * (joint_coordinates.c) are short beside the mechanism and projected one by one, so that of two branches it is the one
+ * that leads on from there.
+ *
+ * What is not asked for stays where that is possible: at first joint coordinates and others that the model gives; then
+ * what the importer set; at last joint coordinates that it set, alone. */
+#include "joint_start.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "digits.h"
+#include "initial_projection.h"
+#include "joint_coordinates.h"
+#include "numbers.h"
+#include "segment.h"
+#include "thresholds.h"
+
+enum { JOINT_STEPS = 1000, JOINT_HALVINGS = 12, JOINT_LEVELS = 3 };
+static const double JOINT_SHORT = 0.25;    /* [rad], or of what a speed moves */
+static const double JOINT_REACHED = 1e-12; /* relative to the terms */
+
+/* The priorities from which joint coordinates and others are held at each level. */
+static const int HELD_JOINTS[JOINT_LEVELS] = {GIVEN, SET, SET}, HELD_OTHERS[JOINT_LEVELS] = {GIVEN, SET, PRIORITIES};
+
+/* What is missing a part of d further on, at `trial`, on the constraints; HUGE_VAL where there is no such place. */
+static double try_joints(Solver *s, double part, int *rows) {
+    struct JointSearch *x = s->joint_search;
+    const Start start = {s, x->at, x->asked, x->zero, x->priority, x->held, x->priority + s->system->nq};
+    mechanism_kinematics(&s->stepped, x->at, x->q);
+    memcpy(x->trial, x->q, (size_t)s->system->nq * sizeof *x->q);
+    mechanism_move(&s->stepped, part, x->d, x->trial);
+    if (mechanism_settle(&s->stepped, x->at, x->trial) != OK || initial_positions(&start, x->trial, rows) != OK)
+        return HUGE_VAL;
+    joint_measure(s, x->trial);
+    return joint_missing(s, NULL);
+}
+
+/* From x->q, by damped Newton's method in short steps, to where nothing is missing. */
+static Status find_joint_places(Solver *s, int *rows) {
+    struct JointSearch *x = s->joint_search;
+    const System *of = s->system;
+    memset(x->c, 0, (size_t)of->m * sizeof *x->c);
+    joint_measure(s, x->q);
+    double off = joint_missing(s, NULL);
+    for (int count = 0, there = off <= JOINT_REACHED; count < JOINT_STEPS && there < 2; count++) {
+        double far = 0, part, less = HUGE_VAL;
+        if (mechanism_evaluate(&s->stepped, x->at, x->q, x->zero) != OK || joint_step(s, rows) != OK) return FAILED;
+        for (int i = 0; i < of->nv; i++)
+            if (s->state.span[i] > 0) far = fmax(far, fabs(x->d[i]) / (JOINT_SHORT * s->state.span[i]));
+        part = far > 1 ? 1 / far : 1;
+        for (int k = 0; k < JOINT_HALVINGS && !(less < off); k++, part /= 2) less = try_joints(s, part, rows);
+        if (!(less < off)) break;
+        memcpy(x->q, x->trial, (size_t)of->nq * sizeof *x->q);
+        off = less;
+        there += off <= JOINT_REACHED; /* one step more leaves rounding */
+    }
+    return off <= JOINT_REACHED ? OK : FAILED;
+}
+
+/* v at x->q with G v = nu and nothing missing; the second sweep removes rounding of the first. */
+static Status find_joint_rates(Solver *s, const int *rows) {
+    struct JointSearch *x = s->joint_search;
+    joint_measure(s, x->q);
+    (void)joint_missing(s, x->v);
+    for (int sweep = 0; sweep < 2; sweep++) {
+        if (mechanism_evaluate(&s->stepped, x->at, x->q, x->zero) != OK) return FAILED;
+        for (int k = 0; k < s->system->m; k++) x->c[k] = -mechanism_slip(&s->stepped, k, x->v);
+        if (joint_step(s, rows) != OK) return FAILED;
+        add_part(s->system->nv, 1, x->d, x->v);
+        if (joint_missing(s, x->v) <= JOINT_REACHED) return OK;
+    }
+    return FAILED;
+}
+
+/* Values or rates from where the coordinates alone begin, by the first level at which they are reached. */
+static void find_joints(Solver *s, int of_rates) {
+    struct JointSearch *x = s->joint_search;
+    const System *of = s->system;
+    int *rows = s->iwork_initial;
+    Status status = FAILED;
+    x->of_rates = of_rates;
+    for (int level = 0; level < JOINT_LEVELS && status != OK; level++) {
+        x->least = HELD_JOINTS[level];
+        if (of_rates)
+            memcpy(x->held, x->priority + of->nq, (size_t)of->nv * sizeof *x->held);
+        else
+            priority_moves(of, x->priority, x->held);
+        for (int i = 0; i < of->nv; i++) x->held[i] = (int)x->held[i] >= HELD_OTHERS[level] ? SET : OMITTED;
+        memset(s->state.closed, 0, (size_t)of->contacts * sizeof *s->state.closed);
+        system_active(of, s->state.closed, rows);
+        if (of_rates)
+            memcpy(x->v, x->asked + of->nq, (size_t)of->nv * sizeof *x->v);
+        else
+            memcpy(x->q, s->state.q, (size_t)of->nq * sizeof *x->q);
+        for (int k = 0; k < of->m; k++) rows[k] &= of_rates || of->rows[k].kind != NONHOLONOMIC;
+        status = of_rates ? find_joint_rates(s, rows) : find_joint_places(s, rows);
+    }
+}
+
+/* Whether a joint coordinate is, or its rate; who said what, of one that is a coordinate behind with the others. */
+static int any_joint_set(Solver *s, const double *begin, const Priority *priority) {
+    struct JointSearch *x = s->joint_search;
+    const System *of = s->system;
+    int any = 0;
+    memcpy(x->asked, begin, (size_t)system_starts(of) * sizeof *begin);
+    memcpy(x->priority, priority, (size_t)system_starts(of) * sizeof *priority);
+    for (int k = 0; k < of->joint_count; k++) {
+        const int j = of->joint[k].coordinate, place = joint_place(s, k, 0);
+        if (j >= 0) {
+            x->asked[place] = begin[j];
+            x->priority[place] = priority[j];
+            x->priority[j] = OMITTED;
+        }
+        any |= x->priority[place] == SET || x->priority[place + 1] == SET;
+    }
+    return any;
+}
+
+/* At the start without them: those that are not set are to stay as they are there; one that is speaks for the
+ * coordinates in it that the model gives, and its rate for the speeds. */
+static void begin_without_joints(Solver *s) {
+    struct JointSearch *x = s->joint_search;
+    const System *of = s->system;
+    joint_measure(s, s->state.q);
+    for (int k = 0; k < of->joint_count; k++) {
+        double *asked = &x->asked[joint_place(s, k, 0)];
+        const Priority *priority = &x->priority[joint_place(s, k, 0)];
+        if (priority[0] != SET) asked[0] = x->value[k];
+        if (priority[1] != SET) asked[1] = x->drift[k] + dot(of->nv, x->H + k * of->nv, s->state.v);
+        for (int i = 0; i < of->nv; i++) {
+            Priority *of_speed = &x->priority[of->nq + i];
+            if (x->H[k * of->nv + i] == 0) continue;
+            if (priority[1] == SET && *of_speed == GIVEN) *of_speed = OMITTED;
+            if (priority[0] != SET) continue;
+            if (of->kinematics == NULL && x->priority[i] == GIVEN) x->priority[i] = OMITTED;
+            for (int e = 0; e < of->rates; e++)
+                if (of->rate_column[e] == i && x->priority[of->rate_row[e]] == GIVEN)
+                    x->priority[of->rate_row[e]] = OMITTED;
+        }
+    }
+}
+
+/* What the importer set is as it was asked for, or the start is refused; what the model gives is told where it is
+ * not. */
+static Status check_joints(Solver *s, Moved moved, void *context) {
+    struct JointSearch *x = s->joint_search;
+    int refused = 0;
+    joint_measure(s, s->state.q);
+    for (x->of_rates = 0; x->of_rates < 2; x->of_rates++) {
+        (void)joint_missing(s, s->state.v);
+        for (int k = 0; k < s->system->joint_count; k++) {
+            const int place = joint_place(s, k, x->of_rates);
+            const double asked = x->asked[place], found = asked - x->miss[k];
+            const StateName of = system_state_name(s->system, place);
+            if (fabs(x->miss[k]) <= TOUCH * x->size[k] || joint_priority(s, k) == OMITTED) continue;
+            if (joint_priority(s, k) == GIVEN) {
+                if (moved != NULL) moved(context, place, asked, found, GIVEN);
+                continue;
+            }
+            if (!refused++) (void)fail(&s->why, "the start is refused:");
+            why_append(&s->why, "%s %s%s%s = %s cannot be reached, the nearest that was found is %s",
+                       refused > 1 ? ";" : "", of.head, of.name, of.tail, digits(asked).text, digits(found).text);
+        }
+    }
+    if (!refused) return OK;
+    why_append(&s->why, ": set what the joints and their limits allow, or other parameters");
+    return FAILED;
+}
+
+static Status start_by_joints(Solver *s, double t, const double *begin, const Priority *priority, Moved moved,
+                              void *context) {
+    struct JointSearch *x = s->joint_search;
+    const int nq = s->system->nq;
+    const double *v0 = begin + nq;
+    if (!any_joint_set(s, begin, priority)) return solver_start(s, t, begin, v0, priority, moved, context);
+    if (solver_start(s, t, begin, v0, priority, NULL, NULL) != OK) return FAILED;
+    x->at = segment_instant(s, t);
+    begin_without_joints(s);
+    for (int of_rates = 0; of_rates < 2; of_rates++) find_joints(s, of_rates);
+    if (solver_start(s, t, x->q, x->v, x->priority, NULL, NULL) != OK) return FAILED;
+    if (check_joints(s, NULL, NULL) != OK) return FAILED;
+    if (moved == NULL) return OK;
+    const Start from = {s, x->at, x->asked, x->asked + nq, x->priority, s->moves, x->priority + nq};
+    initial_moved(&from, moved, context);
+    return check_joints(s, moved, context);
+}
+
+SHARED_VALUE const JointStart JOINT_START = {joint_layout, start_by_joints};
