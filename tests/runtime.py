@@ -20,7 +20,7 @@ from once import once
 RUNTIME = Path(__file__).parent.parent / "lagfmu" / "runtime"
 RUNTIME_FILES = {p.name: p for p in sorted(RUNTIME.glob("*/*.[ch]"))}
 INCLUDES = tuple(f"-I{folder}" for folder in sorted(p for p in RUNTIME.iterdir() if p.is_dir()))
-FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion")
+FLAGS = ("-std=c99", "-O1", "-ffp-contract=off", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion")
 
 
 @cache
@@ -33,7 +33,7 @@ def compiler() -> str:
 
 
 SANITIZE = (
-    *("-O1", "-g", "-fno-omit-frame-pointer"),
+    *("-O0", "-g", "-fno-omit-frame-pointer"),
     *("-fsanitize=address,undefined", "-fno-sanitize-recover=all"),
 )
 

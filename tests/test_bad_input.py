@@ -653,8 +653,8 @@ SMALL_FILES = """
 import resource, signal, sys
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
-from lagfmu.testing import app
-app(sys.argv[1:])
+from lagfmu.cli import main
+main()
 """
 
 

@@ -44,6 +44,7 @@ def test_the_mechanism_of_the_page_is_that_of_the_file():
         assert (runs[0][name] == runs[1][name]).all()
 
 
+@pytest.mark.thorough
 def test_the_figures_of_the_page_are_those_of_the_commands(printed, tmp_path):
     """The outputs of the FMU, the largest forces of the plot, and what a kilogram takes from the bearing."""
     assert "N = n - rank G = 9 - 8 = 1" in printed("show")

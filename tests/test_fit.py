@@ -80,11 +80,12 @@ def test_what_the_angle_does_not_know_is_said(pendulum, swing):
     assert any("not used: lambda.rod" in text for text in found.remarks())
 
 
-def test_an_error_is_what_noise_does(pendulum, swing):
+def test_an_error_is_what_noise_does(pendulum, swing, tmp_path):
     """The standard error of each value is the spread of the values over 60 draws of the noise, within what 60
     draws tell of a spread (30 % is more than three of its standard deviations)."""
+    zipfile.ZipFile(pendulum).extractall(tmp_path)
     drawn = [
-        lagfmu.fit(pendulum, noisy(swing, k, theta=0.01, lambda_rod=0.2), ["L", "m"])
+        lagfmu.fit(tmp_path, noisy(swing, k, theta=0.01, lambda_rod=0.2), ["L", "m"])
         for k in range(60)
     ]
     for name in TRUE:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import EVERY, scene_of
+from conftest import EVERY, of_each_kind, scene_of
 
 from lagfmu import simulate, verify
 from lagfmu.errors import SimulationError
@@ -251,22 +251,14 @@ WORLDS: dict[
 }
 
 
-SLOW = {
-    ("Arm", 1e-8),
-    ("Arm", 1e-12),
-    ("DoubleWishbone", 1e-8),
-    ("DoubleWishbone", 1e-12),
-    ("Stewart", 1e-8),
-    ("Stewart", 1e-12),
-}  # tests/test_rigid_bodies.py has their like
+QUICK = CHANGED.keys() - {"Arm", "DoubleWishbone", "Stewart"}  # test_rigid_bodies.py has their like
 
 
 @pytest.mark.parametrize(
     ("name", "tolerance"),
     [
-        pytest.param(n, tol, marks=pytest.mark.thorough if (n, tol) in SLOW else ())
-        for n in sorted(CHANGED)
-        for tol in (1e-8, 1e-12)
+        *of_each_kind(sorted(CHANGED), 1e-8, label="1e-08", kinds=QUICK),
+        *of_each_kind(sorted(CHANGED), 1e-12, label="1e-12"),
     ],
 )
 def test_outputs_equal_the_closed_forms(name: str, tolerance: float, native_fmu: Any) -> None:

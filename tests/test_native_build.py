@@ -197,13 +197,10 @@ MADE_FOR = {
 SYSTEM_LIBRARIES = ("libc.so.6", "libm.so.6", "KERNEL32.dll", "/usr/lib/libSystem.B.dylib")
 
 
-@pytest.mark.parametrize(
-    "folder",
-    [
-        pytest.param(n, marks=() if n in ("linux64", "win64") else pytest.mark.thorough)
-        for n in NAMES
-    ],
-)
+FOLDERS = of_each_kind(NAMES, kinds=("linux64",))
+
+
+@pytest.mark.parametrize("folder", FOLDERS)
 def test_each_binary_is_for_its_platform_and_exports_fmi_alone(built_for, folder):
     """All 44 functions of FMI 2.0 and nothing else; no library but the system's own."""
     suffix = next(p.suffix for p in PLATFORMS if p.folder == folder)
@@ -224,9 +221,10 @@ def test_each_binary_is_for_its_platform_and_exports_fmi_alone(built_for, folder
             assert b.signed or b.machine == "x86_64"
 
 
-def test_no_path_of_the_building_machine_is_inside(built_for):
+@pytest.mark.parametrize("folder", FOLDERS)
+def test_no_path_of_the_building_machine_is_inside(built_for, folder):
     """Neither folders of this repository, of the compiler and its caches, nor temporary ones."""
-    path = built_for("win64")
+    path = built_for(folder)
     traces = {
         str(HERE.parent),
         str(path.parent),

@@ -10,7 +10,7 @@ from xml.etree import ElementTree as ET
 
 import pytest
 import replay
-from conftest import MODELS
+from conftest import MODELS, of_each_kind
 from junitparser import JUnitXml
 from lxml import etree
 from sympy import symbols
@@ -197,7 +197,7 @@ def test_inputs_come_from_a_file(native_fmu, tmp_path):
 
 
 @pytest.mark.parametrize(
-    "name", ["hemisphere", "half_car", pytest.param("pendulum", marks=pytest.mark.thorough)]
+    "name", of_each_kind(["hemisphere", "half_car", "pendulum"], kinds=("hemisphere",))
 )
 def test_the_results_that_an_fmu_carries_are_replayed(name, tmp_path):
     """A script that knows the layered standard and fmpy alone finds what it says: lambda, Q, coordinates and

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import typer.main
-from conftest import EVERY, Fmu, model_file
+from conftest import EVERY, Fmu, model_file, of_each_kind
 from typer.testing import CliRunner
 
 import lagfmu
@@ -42,10 +42,12 @@ GALLERY = (REPOSITORY / "docs" / "gallery.md").read_text(encoding="utf-8")
 TUTORIAL = (REPOSITORY / "docs" / "tutorial.md").read_text(encoding="utf-8")
 
 
-COMMANDS = [
-    shlex.split(c)
-    for c in dict.fromkeys(re.findall(r"^    lagfmu ([^#\n]*?) *(?:#.*)?$", TEXT, re.MULTILINE))
-]
+def commands(text: str) -> list[list[str]]:
+    """Those of a text, in words."""
+    found = re.findall(r"^    lagfmu ([^#\n]*?) *(?:#.*)?$", text, re.MULTILINE)
+    return [shlex.split(c) for c in dict.fromkeys(found)]
+
+
 BLOCKS = list(dict.fromkeys(re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL)))
 VARIED = ("parameters", "starts")
 TRIED_ELSEWHERE = (
@@ -75,7 +77,7 @@ def quick(command: list[str]) -> bool:
     return not long and Path(command[1]).suffix in (".py", ".fmu") and command[1] != "model.py"
 
 
-@pytest.mark.parametrize("command", COMMANDS, ids=" ".join)
+@pytest.mark.parametrize("command", commands(TEXT), ids=" ".join)
 def test_every_command_has_the_options_that_the_readme_gives_it(command):
     """The command line is read without a complaint, and the model files of the repository exist."""
     name, *arguments = command
@@ -86,18 +88,28 @@ def test_every_command_has_the_options_that_the_readme_gives_it(command):
 
 
 @pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
-def test_the_commands_and_the_examples_run_as_printed(tmp_path, monkeypatch, native_fmu):
-    """In a folder with bead.py and the repository's models, one after the other; then the lines of Python."""
+@pytest.mark.parametrize(
+    "pages", [0, pytest.param(len(PAGES), marks=pytest.mark.thorough)], ids=["readme", "docs"]
+)
+def test_the_commands_run_as_printed(tmp_path, monkeypatch, pages):
+    """In a folder with bead.py and the repository's models, one after the other."""
     (tmp_path / "bead.py").write_text(BLOCKS[0], encoding="utf-8")
     for folder in ("models", "tests"):
         (tmp_path / folder).symlink_to(REPOSITORY / folder)
     monkeypatch.chdir(tmp_path)
-    done = [c for c in COMMANDS if quick(c)]
-    assert len(done) >= 10
+    done = [c for c in commands(TEXT if pages else README) if quick(c)]
+    assert len(done) >= (20 if pages else 5)
     for command in done:
         ended = CliRunner().invoke(app, command)
         assert ended.exit_code == 0, (command, ended.output[-1000:])
-    shutil.copy(native_fmu("Hemisphere"), "dist/native/Hemisphere.fmu")  # as build_fmus.py makes it
+
+
+def test_the_examples_run_as_printed(tmp_path, monkeypatch, native_fmu):
+    """The lines of Python that simulate FMUs, beside those that build_fmus.py made."""
+    monkeypatch.chdir(tmp_path)
+    Path("dist/native").mkdir(parents=True)
+    for name in ("Hemisphere", "CartPendulum"):
+        shutil.copy(native_fmu(name), "dist/native")
     blocks = [b for b in BLOCKS if "import fmpy" in b or "import EcosSimulation" in b]
     blocks = [b for b in blocks if "native-fmi3" not in b]  # test_fmi3.py runs it
     assert len(blocks) == 2
@@ -210,7 +222,13 @@ def test_the_gallery_names_every_model():
     assert {f.stem for f in files} == set(EVERY.values())
 
 
-@pytest.mark.parametrize("name", sorted(set(EVERY.values())))
+@pytest.mark.parametrize(
+    "name",
+    of_each_kind(
+        sorted({*EVERY.values()}),
+        kinds={*EVERY.values()} - {"arm", "bennett", "double_wishbone", "stewart"},
+    ),
+)
 def test_a_model_file_holds_what_is_said_and_drawn_of_it(name: str) -> None:
     """Its scenes are among the FMUs that tests go over, the gallery says what the model says of itself, and
     its picture shows its body and at least one force."""

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import wishbone
 from joints import pin
-from mechanisms import LINKAGES, cardan, door, four_bar, stewart
+from mechanisms import LINKAGES, cardan, door, stewart
 from rigid import GROUND, Mass, Mechanism, rotation, state
 from scipy.special import ellipj, ellipkm1
 
@@ -81,7 +81,7 @@ def test_a_body_near_its_middle_axis_flips_when_jacobis_functions_say(built, tol
     np.testing.assert_allclose(w**2 @ J, energy, rtol=100 * tolerance)
 
 
-QUICK = (door, four_bar, cardan, stewart)
+QUICK = (door, cardan, stewart)
 
 
 @pytest.mark.filterwarnings("ignore::lagfmu.testing.RedundantConstraintWarning")

@@ -301,7 +301,10 @@ def test_bad_input_is_told_with_the_remedy(hemisphere, options, message):
     assert message in " ".join(done.output.split())
 
 
-@pytest.mark.parametrize(("suffix", "engine_"), [("nc", "h5netcdf"), ("zarr", "zarr")])
+@pytest.mark.parametrize(
+    ("suffix", "engine_"),
+    [("nc", "h5netcdf"), pytest.param("zarr", "zarr", marks=pytest.mark.thorough)],
+)
 def test_trajectories_come_back_from_the_file_with_what_they_are(
     hemisphere, tmp_path, suffix, engine_
 ):
