@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shlex
 import shutil
 import zipfile
 from pathlib import Path
@@ -152,6 +153,22 @@ def test_outliers_weigh_less_under_a_robust_loss(pendulum, swing):
         for loss in ("linear", "cauchy")
     ]
     assert off[1] < 0.1 * off[0]
+
+
+def test_galileos_ball_was_solid(monkeypatch):
+    """The distances of f. 107v, at eight beats of 0.55 s on an incline of 1.70 degrees, as Drake read them:
+    kappa = I/(M R^2) of a solid ball is 2/5.  By the line of the documentation, with the FMU's derivative."""
+    page = (MODELS.parent / "docs" / "fit.md").read_text(encoding="utf-8")
+    line = re.search(r"^    lagfmu (fit models/.*)$", page, re.MULTILINE)[1]
+    monkeypatch.chdir(MODELS.parent)
+    done = CliRunner().invoke(app, shlex.split(line))
+    assert done.exit_code == 0, done.output
+    found = re.search(r"kappa +([\d.]+) +([\d.]+) +([\d.]+) \.\.\. ([\d.]+)", done.output)
+    kappa, error, low, high = map(float, found.groups())
+    assert low < 0.4 < high
+    assert abs(kappa - 0.4) < 0.005
+    assert error < 0.005
+    assert "derivatives of the FMU" in done.output
 
 
 def test_friction_from_the_motion_of_what_slides(native_fmu):

@@ -19,7 +19,7 @@ from sympy import symbols
 from sympy.physics.mechanics import dynamicsymbols
 from typer.testing import CliRunner
 
-from lagfmu import Contact, Model, Parameter, Scene
+from lagfmu import Contact, Model, Parameter, Scene, fit
 from lagfmu.errors import BuildError, RequestError
 from lagfmu.testing import app, prepare
 
@@ -338,6 +338,10 @@ def test_two_contacts_that_are_met_at_one_instant(built):
     assert "'floor'" in told[0]
     assert "of v it goes another way" in told[0]
     assert run(fmu, 1.4, 2, {"v": 0.9})["sensitivity.valid"].all()  # there the floor comes first
+    slower = run(fmu, 1.1, 11, {"v": 0.99})
+    found = fit(fmu, {name: np.array(slower[name]) for name in ("time", "x")}, {"v": (0.97, 1.1)})
+    assert abs(found.values["v"] - 0.99) < 1e-6
+    assert any("derivatives of the FMU end within a run" in text for text in found.remarks())
 
 
 def test_a_contact_that_is_only_touched(built):

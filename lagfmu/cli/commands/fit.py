@@ -62,13 +62,17 @@ def fit(
     from ...fmu.read import read_description, units_of
     from ...fmu.write import as_fmu, write_whole
     from ...page.table import new_table, print_whole
-    from ...study.fit.problem import free_of, measure_of
+    from ...study.fit.problem import derivatives_of, free_of, measure_of
     from ...study.fit.solve import TOLERANCE
     from ...study.fit.solve import fit as found_by
     from ...verification.exit_codes import FAILS
     from ...verification.junit import text_of
 
-    with plainly(), as_fmu(target, scene) as fmu:
+    told = derivatives_of(
+        [text.partition("=")[0].strip() for text in free or ()],
+        [text.partition(":")[0].strip() for text in measure or ()],
+    )
+    with plainly(), as_fmu(target, scene, sensitivities=told) as fmu:
         units = units_of(read_description(fmu).modelVariables)
         found = found_by(
             fmu,

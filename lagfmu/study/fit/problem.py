@@ -8,7 +8,7 @@ lambda.rod:0.1             measured, with a standard deviation of 0.1 in its uni
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -57,6 +57,12 @@ class Problem:
     def points(self) -> int:
         """How many numbers were measured."""
         return sum(int(np.isfinite(c).sum()) for s in self.series for c in s.measured.values())
+
+
+def derivatives_of(free: Iterable[str], measure: Iterable[str]) -> list[str]:
+    """What an FMU that is built for the fit shall tell, as a scene's sensitivities."""
+    by, of = ",".join(free), ",".join(measure)
+    return [f"{of}:{by}"] if by and of else []
 
 
 def free_of(text: str, units: Mapping[str, str | None]) -> tuple[str, Any]:

@@ -24,7 +24,7 @@ class Residuals:
 
     `given`: what is set besides; `step` [s]: of inputs, which an FMU gets as straight pieces; `difference`:
     the part of its magnitude by which a free value is changed to find derivatives (central differences);
-    `runs`: how many there were.
+    `runs`: how many there were; `ended`: in one of them the FMU's own derivatives did not exist throughout.
     """
 
     def __init__(
@@ -40,6 +40,7 @@ class Residuals:
         self.difference = tolerance ** (1 / 3)
         self.runs = 0
         self.own: set[str] = set()
+        self.ended = False
         self.measured = np.concatenate(
             [c[np.isfinite(c)] for s in problem.series for c in s.measured.values()]
         )
@@ -85,6 +86,7 @@ class Residuals:
             more = [_derivative(o, p) for p in free for o in one.measured]
             rows = self._run(one, x, [*more, names.SENSITIVITY_VALID])
             if not rows[names.SENSITIVITY_VALID].all():
+                self.ended = True
                 return {}
             for p in free:
                 for o, c in one.measured.items():

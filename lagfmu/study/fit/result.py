@@ -25,7 +25,7 @@ class Fit:
     """`x` (free,) in SI units and the `certainty` of it; `deviations` of each measured output, given or
     estimated; `predicted` and `measured` (points,), `of` which output each is; `cost` half the sum of squares
     in deviations (with its loss); `runs` of the FMU, and the relative `difference` for derivatives, but by
-    those that are its `own`."""
+    those that are its `own`, unless these `ended` within a run."""
 
     name: str
     problem: Problem
@@ -40,6 +40,7 @@ class Fit:
     runs: int
     difference: float
     own: frozenset[str] = frozenset()
+    ended: bool = False
 
     @property
     def values(self) -> dict[str, float]:
@@ -110,6 +111,11 @@ class Fit:
                 f"not determined by the data: a change of {' with '.join(parts)} is felt by "
                 f"{one.felt:.1g} standard deviations in all: measure another output, or fix "
                 f"{'it' if len(parts) == 1 else 'one of them'}"
+            )
+        if self.ended:
+            told.append(
+                "the derivatives of the FMU end within a run (sensitivity.valid; its log names the event), "
+                "and differences of runs took their place"
             )
         names, loose = list(self.values), {n for c in self.undetermined for n in c.changes}
         for i, a in enumerate(names):

@@ -19,7 +19,7 @@ from ...model.scene import Scene
 from ...numeric.tolerance import tolerance_problem
 from .certainty import certainty
 from .experiment import experiments_of
-from .problem import LOSSES, Problem, problem_of
+from .problem import LOSSES, Problem, derivatives_of, problem_of
 from .residuals import Residuals
 from .result import Fit
 
@@ -72,8 +72,7 @@ def fit(
         raise SettingError(problem)
     sought = free if isinstance(free, Mapping) else dict.fromkeys(free)
     wanted = measure if isinstance(measure, Mapping) else dict.fromkeys(measure)
-    derivatives = [f"{','.join(wanted)}:{','.join(sought)}"] if wanted and sought else []
-    with as_fmu(source, scene, sensitivities=derivatives) as path:
+    with as_fmu(source, scene, sensitivities=derivatives_of(sought, wanted)) as path:
         description = read_description(path)
         if text := obstacle(path, description):
             raise SimulationError(f"{str(path)!r} {text}")
@@ -131,6 +130,7 @@ def _solve(name: str, problem: Problem, residuals: Residuals, loss: str) -> Fit:
         runs=residuals.runs,
         difference=residuals.difference,
         own=frozenset(residuals.own),
+        ended=residuals.ended,
     )
 
 
