@@ -1,15 +1,20 @@
-"""Adjoint derivatives: the rows of the Jacobian whose columns are the directional ones, by one solve."""
+"""Adjoint derivatives: the rows of the Jacobian whose columns are the directional ones, each at once."""
 
 from __future__ import annotations
 
 import math
 from ctypes import byref, c_double, c_size_t
+from pathlib import Path
 
 import numpy as np
 import pytest
 from redundant import platform
+from sympy import Piecewise, sqrt, symbols
+from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu.testing import find_compiler
+from lagfmu import Model, Output, Parameter, Scene
+from lagfmu.bodies import Body, Gravity, Ground, Revolute, SpringDamper, mechanism
+from lagfmu.testing import find_compiler, load
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
 
@@ -62,6 +67,71 @@ def test_the_adjoint_is_the_transposed_jacobian(library3, name):
     seed = np.random.default_rng(1).normal(size=len(unknowns))
     found = one.derive("GetAdjointDerivative", unknowns, knowns, list(seed))
     np.testing.assert_allclose(found, seed @ directional, rtol=1e-11, atol=1e-11 * scale)
+
+
+def assert_transposed(one) -> None:
+    """Row by row as column by column, to rounding of the row's terms or, where these cancel, of all."""
+    directional, adjoint = jacobians(one)
+    assert directional.size > 100
+    rows = abs(directional).max(axis=1, keepdims=True)
+    assert (abs(adjoint - directional) <= 1e-11 * rows + 1e-13 * rows.max()).all()
+
+
+def test_the_adjoint_of_a_long_chain(library3, built):
+    """Sixteen links that are alike share one function, and each bob adds what both its links say."""
+    model = load(Path(__file__).parents[1] / "models/chain.py", ["n=16"]).model
+    one = library3(built(model, fmi=3))().start()
+    one.step(0.05)
+    assert_transposed(one)
+
+
+def test_the_adjoint_of_bodies_in_space(library3, built):
+    """Hinges of two kinds, and the norms of their forces as outputs."""
+    links = [Body(f"b{k}", mass=1.0 + k, inertia=(0.02, 0.03, 0.01)) for k in range(4)]
+    hinges, last = [], Ground().at((0, 0, 0))
+    for k, link in enumerate(links):
+        hinges.append(Revolute(f"J{k}", last, link.at((0.1, 0, 0.5)), axis="xy"[k % 2]))
+        last = link.at((0, 0.1, -0.5))
+    spring = SpringDamper("spring", Ground().at((1, 1, 1)), last, stiffness=30.0, length=1.0)
+    start = {f"b{k}.position": (-0.1 * (k + 1), 0.1 * k, -0.5 - k) for k in range(4)}
+    model = mechanism(
+        "HangingLinks",
+        bodies=links,
+        joints=hinges,
+        loads=[Gravity((0, 0, -9.81)), spring],
+        start=start,
+    )
+    one = library3(built(model, fmi=3))().start()
+    one.step(0.05)
+    assert_transposed(one)
+
+
+def test_a_slope_that_is_no_number_stays_with_its_output(library3, built):
+    """At rest the speed sqrt(x'^2 + y'^2) has none by x' and y', and others have theirs; of two cases the one
+    that holds is differentiated: d sqrt(x)/dx at x = 0 is in the other."""
+    x, y = dynamicsymbols("x y")
+    m, k, L = symbols("m k L", positive=True)
+    root = Piecewise((x, x < L), (sqrt(L * (x - L)), True))
+    model = Model(
+        name="Corner",
+        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2 - k * root**2 / 2,
+        coordinates={x: "m", y: "m"},
+        parameters=[Parameter(m, 1, "kg"), Parameter(k, 2, "N/m"), Parameter(L, 1, "m")],
+        start={x: 0.5, y: 0.0},
+        outputs=[
+            Output("speed", sqrt(x.diff() ** 2 + y.diff() ** 2), "m/s"),
+            Output("root", root, "m"),
+        ],
+    )
+    one = library3(built(model, Scene("Corner"), fmi=3))().start()
+    states = ["x", "y", "der(x)", "der(y)"]
+    assert one.derive("GetAdjointDerivative", ["root", "der(x,2)"], states, [3.0, 1.0]) == [
+        1,
+        0,
+        0,
+        0,
+    ]
+    assert "derivative of 'speed'" in one.refuses("GetAdjointDerivative", *asks(one, "speed", "x"))
 
 
 def test_a_constraint_runs_away_from_what_stands_still(library3):

@@ -128,10 +128,12 @@ def sources_of(prepared: Prepared, listed: bool = True, face: Face = USUAL) -> S
     dae = bool(table.those(names.RESIDUAL_RATE))
     measured, joints = bool(table.measured), bool(form.joint_coordinates)
     gone = files_left_out(scene, system, integrators, measured, dae, joints)
+    tangents, adjoints = needs_tangents(scene, system), None
+    if face.fmi == 3:
+        adjoints = tangents and scene.differentiable and not system.frictions
+    model = model_source(form, tangents, frozenset(table.varied), adjoints)
     generated = {
-        "model.c": model_source(
-            form, needs_tangents(scene, system), frozenset(table.varied)
-        ).encode(),
+        "model.c": model.encode(),
         "variables.c": variables_source(table, form, scene, system).encode(),
         "optional.c": optional_source(scene, system, integrators, measured, joints).encode(),
     }

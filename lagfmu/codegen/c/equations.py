@@ -38,14 +38,20 @@ HEAD = """/* model.c -- {name}{description}
 #include "system.h"
 #include "variables.h"
 """
+ADJOINT = "SHARED_VALUE const Adjoint *const MODEL_ADJOINT = {};\n"
 POINTER = "\nSHARED_VALUE const System *const MODEL_SYSTEM = &{}equations;\n"
 
 
-def model_source(form: Form, tangents: bool = True, by: frozenset[str] = frozenset()) -> str:
+def model_source(
+    form: Form,
+    tangents: bool = True,
+    by: frozenset[str] = frozenset(),
+    adjoints: bool | None = None,
+) -> str:
     """C text that defines MODEL_SYSTEM, the numeric form of the equations.
 
     `tangents`: with the derivatives that directional derivatives and radau5 need; `by`: parameters by which
-    they are taken as well.
+    they are taken as well; `adjoints`: with those of FMI 3.0 (None: it is another version).
 
     Raises DerivationError if a function or a number has no counterpart in C.
     """
@@ -53,7 +59,7 @@ def model_source(form: Form, tangents: bool = True, by: frozenset[str] = frozens
     given = form.equations
     symbols = _real([*given.q, *given.v, *given.u, *given.p, TIME])
     time = symbols.get(TIME, TIME)
-    whole = parts_of(_in_reals(form), jumps.mapped(symbols), tangents, time, by)
+    whole = parts_of(_in_reals(form), jumps.mapped(symbols), tangents, time, by, bool(adjoints))
     eom = whole[0].eom
     index = _index("coordinates", eom.q)
     if not eom.moves_plainly:
@@ -63,6 +69,8 @@ def model_source(form: Form, tangents: bool = True, by: frozenset[str] = frozens
         index += _index("coordinates that are stepped", whole[-1].eom.q)
     text = "\n".join(piece for parts in whole for piece in (*_embedding(parts), _system(parts)))
     text += POINTER.format(whole[-1].prefix)
+    if adjoints is not None:
+        text += ADJOINT.format(f"&{whole[-1].prefix}adjoints" if adjoints else "NULL")
     helpers = [
         code for name, code in {**HELPERS, **FUNCTIONS, "fill": FILL}.items() if f"{name}(" in text
     ]
@@ -70,6 +78,8 @@ def model_source(form: Form, tangents: bool = True, by: frozenset[str] = frozens
     model = eom.model
     description = f": {model.description}" if model.description else ""
     head = HEAD.format(name=model.name, description=_comment(description), index=index)
+    if adjoints is not None:
+        head += '#include "adjoint.h"\n'
     return "\n".join([head, *helpers, text])
 
 
@@ -148,6 +158,9 @@ def _embedding(parts: Parts) -> list[str]:
 
 
 def _define(f: Function, names: Mapping[Expr, str], prefix: str = "") -> str:
+    if f.name.endswith("adjoint"):
+        flat = [s for a, group in f.arguments.items() if a.startswith("w") for s in group]
+        names = {**names, **identifiers(flat, [*names.values()])}
     return function(prefix + f.name, f.doc, f.arguments, f.results, names)
 
 
@@ -162,7 +175,7 @@ def _system(parts: Parts) -> str:
     texts |= {f.name: _define(f, _reported(parts, names)) for f in own}
     tables = Tables(parts)
     text = tables.of_what_is_read if parts.eom.bare else tables.text
-    return "\n".join([*texts.values(), text(set(texts))])
+    return "\n".join([*texts.values(), text(set(texts))]) + tables.adjoints(set(texts))
 
 
 def _bounds(parts: Parts, changing: Sequence[Expr]) -> str:

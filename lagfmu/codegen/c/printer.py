@@ -15,6 +15,7 @@ from sympy.core.relational import Relational
 from sympy.logic.boolalg import Boolean, BooleanFunction
 
 from ...errors import DerivationError
+from ...model.differential import Share
 from ...model.elements import Expr
 from ..identifier import identifier
 
@@ -33,6 +34,7 @@ FUNCTIONS = {
     sp.loggamma: "lgamma",
     sp.sign: "sign",
     sp.Heaviside: "heaviside",
+    Share: "share",
 }
 CUBIC = """/* A tabulated function and its derivatives: y = c0 + c1 s + c2 s^2 + c3 s^3, s = x - x[k], between
  * knots (de Boor, A Practical Guide to Splines, ch. IV); a straight line, or the period, outside. */
@@ -66,6 +68,7 @@ HELPERS = {  # what <math.h> has not; printed into a file that calls it
         "static inline double heaviside(double x, double at_zero) {\n"
         "    return x > 0.0 ? 1.0 : x < 0.0 ? 0.0 : at_zero;\n}\n"
     ),
+    "share": "static inline double share(double w, double e) {\n    return w != 0.0 ? w * e : 0.0;\n}\n",
     "cubic": CUBIC,
 }
 
@@ -88,7 +91,8 @@ MATH = """
 OURS = """
     t q v u p s sdot M F G nu gamma f h e energy dt dq dv du ds dsdot dM dF dG dnu dgamma df denergy fill
     rates drift angle drates ddrift places shared blocks vdot Q dvdot dlambda dQ w dw other dother
-    sign heaviside cubic Cubic
+    sign heaviside share cubic Cubic
+    wM wF wG wnu wgamma wf wenergy wrates wdrift wq wv ww wother gt gq gv gs gsdot gu gvdot glambda gQ
     Kind Formulation Row System Plan Type Role Place Variable near far small interface
     linux unix i386 main Friction coefficients load normal
     data rotation rotation_change turned turned_change across across_change levers

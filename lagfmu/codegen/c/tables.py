@@ -26,7 +26,8 @@ class Tables:
         """A System of coordinates that are only read: names, and the energies if they are read."""
         names, fields = self._layout()
         own, more = self._outputs(functions)
-        fields |= {name: f"{self.prefix}{name}" for name in sorted(functions)} | more
+        known = sorted(name for name in functions if not name.endswith("adjoint"))
+        fields |= {name: f"{self.prefix}{name}" for name in known} | more
         lines = "".join(f"    .{name} = {value},\n" for name, value in fields.items())
         return f"{names}{own}static const System {self.prefix}equations = {{\n{lines}}};\n"
 
@@ -140,6 +141,20 @@ class Tables:
                 fields["coulomb_tangent"] = f"{p}coulomb_tangent"
         lines = "".join(f"    .{name} = {value},\n" for name, value in fields.items())
         return "".join(tables) + f"static const System {p}equations = {{\n{lines}}};\n"
+
+    def adjoints(self, functions: Collection[str]) -> str:
+        """The Adjoint of those functions that are one; nothing without."""
+        p = self.prefix
+        found = {name: p + name for name in sorted(functions) if name.endswith("adjoint")}
+        if not found:
+            return ""
+        found = {
+            name.removesuffix("_adjoint").replace("adjoint", "equations"): value
+            for name, value in found.items()
+        }
+        found |= {"embed": "embed_adjoint", "full": "&adjoints"} if p else {}
+        lines = "".join(f"    .{name} = {value},\n" for name, value in found.items())
+        return f"\nstatic const Adjoint {p}adjoints = {{\n{lines}}};\n"
 
     def _outputs(self, functions: Collection[str]) -> tuple[str, dict[str, Any]]:
         """Tables of the model's own outputs, and the System's fields that hold them."""

@@ -80,14 +80,16 @@ SHARED int component_serialized_size(Component *c, const Call *call, const void 
 SHARED int component_serialize(Component *c, const Call *call, const void *state, char *bytes, size_t size);
 SHARED int component_deserialize(Component *c, const Call *call, const char *bytes, size_t size, void **state);
 
-/* component_derivatives.c: how variables change along a direction (seed of the knowns), how the sum
- * of variables by their seeds does with each known, and how variables change with time. */
+/* component_derivatives.c: how variables change along a direction (seed of the knowns), and with time.  Can partial
+ * derivatives be had now, and are all arrays there; has a variable some; where a known's change stands in the direction
+ * (NULL: the log has why it is none). */
+SHARED int component_derivable(Component *c, const Call *call, int complete);
+SHARED int component_has_derivatives(const Variable *v);
+SHARED double *component_known(Component *c, const Call *call, const Group *group, unsigned known, double change,
+                               double *dt);
 SHARED int component_directional(Component *c, const Call *call, const Group *group, const unsigned unknowns[],
                                  size_t unknown_count, const unsigned knowns[], size_t known_count,
                                  const double seed[], double sensitivity[]);
-SHARED int component_adjoint(Component *c, const Call *call, const Group *group, const unsigned unknowns[],
-                             size_t unknown_count, const unsigned knowns[], size_t known_count, const double seed[],
-                             double sensitivity[]);
 SHARED int component_rates(Component *c, const Call *call, const Group *group, const unsigned references[],
                            size_t count, const int orders[], double values[]);
 SHARED int component_push(Component *c, const Call *call, const Group *group, const unsigned references[], size_t count,

@@ -6,22 +6,16 @@
 #include "component.h"
 #include "digits.h"
 
-/* Adds a known variable's change to the direction; 0 if it is neither time nor a state nor an input, nor a multiplier
+/* Where a known variable's change stands; NULL if it is neither time nor a state nor an input, nor a multiplier
  * that is given. */
-static int add_seed(Instance *x, double *dt, const Variable *v, double change) {
+static double *known_place(Instance *x, const Variable *v, double *dt) {
     const int nq = MODEL_SYSTEM->nq, j = variable_state(v);
     Sensitivity *w = &x->solver.sensitivity;
-    if (v->place == AT_TIME)
-        *dt += change;
-    else if (v->place == AT_INPUT)
-        w->du[v->index] += change;
-    else if (v->place == AT_LAMBDA && x->imposed)
-        w->dgiven[v->index] += change;
-    else if (j < 0)
-        return 0;
-    else
-        *(j < nq ? &w->dq[j] : &w->dv[j - nq]) += change;
-    return 1;
+    if (v->place == AT_TIME) return dt;
+    if (v->place == AT_INPUT) return &w->du[v->index];
+    if (v->place == AT_LAMBDA && x->imposed) return &w->dgiven[v->index];
+    if (j < 0) return NULL;
+    return j < nq ? &w->dq[j] : &w->dv[j - nq];
 }
 
 /* The direction in which everything is to change: so far nothing. */
@@ -34,16 +28,17 @@ static Direction no_direction(Sensitivity *w) {
     return (Direction){0, w->dq, w->dv, w->du, w->dp};
 }
 
-/* A known variable, by whose change something else is to change. */
-static int take_seed(Component *c, const Call *call, const Group *group, unsigned known, double change, Direction *d) {
+double *component_known(Component *c, const Call *call, const Group *group, unsigned known, double change, double *dt) {
     Why text;
     const Variable *v = component_find(c, call, known, group);
-    if (v == NULL) return CALL_ERROR;
-    if (isfinite(change) && add_seed(&c->instance, &d->dt, v, change)) return CALL_OK;
+    if (v == NULL) return NULL;
+    double *place = known_place(&c->instance, v, dt);
+    if (isfinite(change) && place != NULL) return place;
     (void)fail(&text, "%s: a change of '%s' by %s, expected a finite change of a continuous state or an input%s",
                call->name, v->name, digits(change).text,
                ALGEBRAIC != NULL ? ", or of a multiplier once one has been set" : "");
-    return component_refuse(c, text.text);
+    (void)component_refuse(c, text.text);
+    return NULL;
 }
 
 /* Quaternions that are set are normalized: of a direction there is what is left of it then. */
@@ -51,10 +46,11 @@ static void settle_direction(Instance *x) {
     mechanism_settle_change(&x->solver.stepped, x->solver.state.q, x->solver.sensitivity.dq);
 }
 
-static int is_derived(const Variable *v) { return v->role == ROLE_OUTPUT || v->role == ROLE_START; }
+int component_has_derivatives(const Variable *v) {
+    return v->role == ROLE_OUTPUT || v->role == ROLE_START;
+}
 
-/* Can partial derivatives be had now, and are there all arrays? */
-static int check_call(Component *c, const Call *call, int complete) {
+int component_derivable(Component *c, const Call *call, int complete) {
     Why text;
     if (component_forbids(c, call)) return CALL_ERROR;
     if (c->instance.phase == INITIALIZATION) {
@@ -70,47 +66,21 @@ int component_directional(Component *c, const Call *call, const Group *group, co
                           double sensitivity[]) {
     const int complete = (unknown_count == 0 || (unknowns != NULL && sensitivity != NULL)) &&
                          (known_count == 0 || (knowns != NULL && seed != NULL));
-    if (check_call(c, call, complete) != CALL_OK) return CALL_ERROR;
+    if (component_derivable(c, call, complete) != CALL_OK) return CALL_ERROR;
     Direction d = no_direction(&c->instance.solver.sensitivity);
-    for (size_t k = 0; k < known_count; k++)
-        if (take_seed(c, call, group, knowns[k], seed[k], &d) != CALL_OK) return CALL_ERROR;
+    for (size_t k = 0; k < known_count; k++) {
+        double *change = component_known(c, call, group, knowns[k], seed[k], &d.dt);
+        if (change == NULL) return CALL_ERROR;
+        *change += seed[k];
+    }
     if (instance_observe(&c->instance) != OK) return component_no_value(c);
     settle_direction(&c->instance);
     if (instance_differentiate(&c->instance, d) != OK) return component_no_value(c);
     for (size_t k = 0; k < unknown_count; k++) {
         const Variable *v = component_find(c, call, unknowns[k], group);
         if (v == NULL) return CALL_ERROR;
-        if (!is_derived(v) || instance_change(&c->instance, v, d, &sensitivity[k]) != OK)
+        if (!component_has_derivatives(v) || instance_change(&c->instance, v, d, &sensitivity[k]) != OK)
             return component_no_derivative(c, call, v);
-    }
-    return CALL_OK;
-}
-
-int component_adjoint(Component *c, const Call *call, const Group *group, const unsigned unknowns[],
-                      size_t unknown_count, const unsigned knowns[], size_t known_count, const double seed[],
-                      double sensitivity[]) {
-    const int complete = (unknown_count == 0 || (unknowns != NULL && seed != NULL)) &&
-                         (known_count == 0 || (knowns != NULL && sensitivity != NULL));
-    const Variable *undefined;
-    Instance *x = &c->instance;
-    Why text;
-    if (check_call(c, call, complete) != CALL_OK) return CALL_ERROR;
-    for (size_t k = 0; k < unknown_count; k++) {
-        const Variable *v = component_find(c, call, unknowns[k], group);
-        if (v == NULL) return CALL_ERROR;
-        if (!is_derived(v)) return component_no_derivative(c, call, v);
-        if (isfinite(seed[k])) continue;
-        (void)fail(&text, "%s: the seed of '%s' is %s, expected a finite number", call->name, v->name,
-                   digits(seed[k]).text);
-        return component_refuse(c, text.text);
-    }
-    if (instance_adjoint(x, unknowns, seed, unknown_count) != OK) return component_no_value(c);
-    for (size_t k = 0; k < known_count; k++) {
-        Direction d = no_direction(&x->solver.sensitivity);
-        if (take_seed(c, call, group, knowns[k], 1, &d) != CALL_OK) return CALL_ERROR;
-        settle_direction(x);
-        if (instance_gradient(x, unknowns, seed, unknown_count, d, &sensitivity[k], &undefined) == OK) continue;
-        return undefined != NULL ? component_no_derivative(c, call, undefined) : component_no_value(c);
     }
     return CALL_OK;
 }

@@ -14,16 +14,6 @@ fmi3Status fmi3GetDirectionalDerivative(fmi3Instance instance, const fmi3ValueRe
     return component_directional(instance, call, &FLOAT64, unknowns, nUnknowns, knowns, nKnowns, seed, sensitivity);
 }
 
-fmi3Status fmi3GetAdjointDerivative(fmi3Instance instance, const fmi3ValueReference unknowns[], size_t nUnknowns,
-                                    const fmi3ValueReference knowns[], size_t nKnowns, const fmi3Float64 seed[],
-                                    size_t nSeed, fmi3Float64 sensitivity[], size_t nSensitivity) {
-    const Call *call = FMI3_CALL(fmi3GetAdjointDerivative);
-    if (component_forbids(instance, call) || component3_miscounts(instance, call, nSeed, nUnknowns) ||
-        component3_miscounts(instance, call, nSensitivity, nKnowns))
-        return fmi3Error;
-    return component_adjoint(instance, call, &FLOAT64, unknowns, nUnknowns, knowns, nKnowns, seed, sensitivity);
-}
-
 fmi3Status fmi3GetOutputDerivatives(fmi3Instance instance, const fmi3ValueReference valueReferences[],
                                     size_t nValueReferences, const fmi3Int32 orders[], fmi3Float64 values[],
                                     size_t nValues) {

@@ -43,7 +43,6 @@ void instance_layout(Instance *x, Arena *arena) {
             x->before[k] = arena_take(&scratch, (size_t)event_count_of(system, (EventKind)k), sizeof(Count));
         x->shared = arena_ints(&scratch, system->frictions);
         x->happened = arena_ints(&scratch, indicators_count(system));
-        x->own_weight = arena_doubles(&scratch, (system->full != NULL ? system->full : system)->output_count);
         x->between.supplied = arena_ints(&scratch, system->inputs);
         x->between.value = arena_doubles(&scratch, system->inputs);
         x->indicators = arena_doubles(&scratch, indicators_count(system));

@@ -32,7 +32,6 @@ typedef struct Instance {
     Between between;        /* context: that of tell() */
     Observed seen;          /* what can be read at the state; belongs to it while `observed` is 1 */
     Sensitivity along;      /* of the full system, where there is an embedding */
-    double *own_weight;     /* (outputs of the model's own) of instance_adjoint() */
     Instant at;             /* of instance_factor() */
     Settings given;         /* solver.* as they were set; tolerance 0: not set */
     double start_time;            /* [s] of the experiment; its end is solver.stop_time */
@@ -150,13 +149,6 @@ SHARED Status instance_factor(Instance *x);
 SHARED Status instance_differentiate_factored(Instance *x, Direction d);
 
 SHARED Status instance_change(const Instance *x, const Variable *v, Direction d, double *change);
-
-/* The adjoint: of the sum of weighted variables, by their value references.  First one transposed solve for it, then its
- * change along a direction, for as many as there are; FAILED: it cannot be said, the cause is in x->solver.why, unless a
- * variable's derivative is not defined: `undefined`, else NULL. */
-SHARED Status instance_adjoint(Instance *x, const unsigned unknowns[], const double weights[], size_t count);
-SHARED Status instance_gradient(Instance *x, const unsigned unknowns[], const double weights[], size_t count,
-                                Direction d, double *sum, const Variable **undefined);
 
 /* The same along the motion: the derivative of a variable with respect to time. */
 SHARED Status instance_rates(Instance *x, Direction *d);

@@ -9,11 +9,7 @@
  *
  * (where the multipliers are given, M dvdot = b + G^T dlambda with their change alone),
  * a further solve with the factors that gave vdot and lambda (implicit function theorem; Hairer &
- * Wanner II, sect. VII.1, for index-1 equations).  Weights a of dvdot and l of dlambda are weights x of b and mu of c,
- *
- *   M x + G^T mu = a ,  -G x = l :
- *
- * one such solve for all directions (the adjoint; Griewank & Walther, Evaluating Derivatives, 2008, ch. 3). */
+ * Wanner II, sect. VII.1, for index-1 equations). */
 #include "sensitivity.h"
 
 #include <math.h>
@@ -40,10 +36,6 @@ void sensitivity_layout(Sensitivity *w, Arena *arena, const System *s) {
     w->dforce = arena_doubles(arena, s->nv);
     w->dgiven = arena_doubles(arena, s->m);
     w->known = arena_doubles(arena, s->m);
-    w->on_vdot = arena_doubles(arena, s->nv);
-    w->on_lambda = arena_doubles(arena, s->m);
-    w->on_b = arena_doubles(arena, s->nv);
-    w->on_c = arena_doubles(arena, s->m);
     w->down = arena_doubles(arena, s->output_count);
     w->dother = arena_doubles(arena, s->output_count);
     w->slide = NULL;
@@ -101,11 +93,6 @@ static Status check_sides(const Sensitivity *w, const Mechanism *b, Instant at) 
     return OK;
 }
 
-Status sensitivity_sides(Sensitivity *w, Mechanism *b, Instant at, const double *q, const double *v, Direction d) {
-    find_sides(w, b, at, q, v, d);
-    return check_sides(w, b, at);
-}
-
 Status sensitivity_along(Sensitivity *w, Mechanism *b, Instant at, const double *q,
                          const double *v, Direction d) {
     const System *s = b->system;
@@ -123,16 +110,6 @@ Status sensitivity_along(Sensitivity *w, Mechanism *b, Instant at, const double 
                         "along them",
                         s->rows[k].name);
     return FAILED;
-}
-
-Status sensitivity_adjoint(Sensitivity *w, Mechanism *b) {
-    const System *s = b->system;
-    for (int k = 0; k < s->m; k++) w->c[k] = -w->on_lambda[k];
-    if (linear_nearest(&b->linear, w->on_vdot, w->c, w->on_b, w->on_c) != OK) return FAILED;
-    for (int k = 0; k < s->m; k++) w->on_c[k] = -w->on_c[k];
-    memset(w->dvdot, 0, (size_t)s->nv * sizeof *w->dvdot);
-    memset(w->dlambda, 0, (size_t)s->m * sizeof *w->dlambda);
-    return OK;
 }
 
 void sensitivity_of_values(Sensitivity *w, const System *s, Instant at, const double *q,

@@ -24,8 +24,6 @@ typedef struct Sensitivity {
     double *down, *dother;   /* (output_count) changes of these */
     double *dgiven;          /* (m) change of multipliers that are given; read where they are */
     double *known;           /* (m) dlambda where it is unique, no numbers elsewhere */
-    double *on_vdot, *on_lambda;     /* (nv), (m) weights, and ... */
-    double *on_b, *on_c;             /* ... those of b and c that follow from them */
     /* Of frictions: what `slide` does in the place of one solve, and its memory. */
     Status (*slide)(struct Sensitivity *w, Mechanism *b, Instant at, const double *q, const double *v, Direction d);
     double *dmu, *dpart_load, *dpart_c; /* (2 frictions), (normal_parts), (normal_rows) */
@@ -42,14 +40,6 @@ SHARED Status sensitivity_along(Sensitivity *w, Mechanism *b, Instant at, const 
 
 /* sliding_along.c: the same with frictions that slip or stick as they do there, from b and c. */
 SHARED Status sliding_along(Sensitivity *w, Mechanism *b, Instant at, const double *q, const double *v, Direction d);
-
-/* The same but dvdot and dlambda, for which nothing is solved: those of the coefficients, and the right sides b, c. */
-SHARED Status sensitivity_sides(Sensitivity *w, Mechanism *b, Instant at, const double *q, const double *v,
-                                Direction d);
-
-/* The transposed solve with the factors of that motion:  on_vdot . dvdot + on_lambda . dlambda = on_b . b + on_c . c
- * for every direction.  What dvdot and dlambda are after it is 0; multipliers that are given are in b. */
-SHARED Status sensitivity_adjoint(Sensitivity *w, Mechanism *b);
 
 /* Changes of M, F, G, nu, gamma, f and the energies along a direction; nothing is solved. */
 SHARED void sensitivity_of_values(Sensitivity *w, const System *s, Instant at, const double *q,

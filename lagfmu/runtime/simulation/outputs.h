@@ -23,9 +23,4 @@ static inline int outputs_unique_doubles(const System *s) {
 SHARED void outputs_change(Sensitivity *w, const Mechanism *b, const System *s, Instant at,
                            const Observed *o, Direction d);
 
-/* Weights (output_count) of these changes as weights w->on_vdot and w->on_lambda of those of the accelerations and
- * the multipliers, to which they are added. */
-SHARED void outputs_weigh(Sensitivity *w, const Mechanism *b, const System *s, Instant at, const Observed *o,
-                          const double *weight);
-
 #endif
