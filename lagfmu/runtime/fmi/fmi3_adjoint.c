@@ -45,7 +45,8 @@ static void weigh(Instance *x, const Variable *v, double weight, double *dt) {
 }
 
 /* What has no derivative has none along any direction: `undefined`, or NULL for another cause. */
-static Status check_defined(Instance *x, const fmi3ValueReference unknowns[], size_t count, const Variable **undefined) {
+static Status check_defined(Instance *x, const fmi3ValueReference unknowns[], size_t count,
+                            const Variable **undefined) {
     Sensitivity *w = &x->solver.sensitivity;
     double change;
     *undefined = NULL;
@@ -74,7 +75,8 @@ static Status find_gradient(Instance *x, const fmi3ValueReference unknowns[], co
     for (size_t k = 0; k < count; k++) weigh(x, &VARIABLES[unknowns[k]], weights[k], dt);
     if (full != NULL) {
         Mechanism *solved = full->dynamics != NULL ? &s->full : NULL;
-        if (adjoint_back(w, solved, full, MODEL_ADJOINT->full, at, &x->seen, x->seen.q, x->seen.v, dt, stepped->du) != OK)
+        const Adjoint *of = MODEL_ADJOINT->full;
+        if (adjoint_back(w, solved, full, of, at, &x->seen, x->seen.q, x->seen.v, dt, stepped->du) != OK)
             return FAILED;
         MODEL_ADJOINT->embed(at.t, q, v, at.u, at.p, w->dq, w->dv, dt, stepped->dq, stepped->dv, stepped->du);
     }
@@ -118,7 +120,8 @@ fmi3Status fmi3GetAdjointDerivative(fmi3Instance instance, const fmi3ValueRefere
     const Variable *undefined = NULL;
     double dt = 0;
     if (MODEL_ADJOINT == NULL) {
-        (void)fail(&x->solver.why, "%s: this FMU was built without: its scene has frictions, or no derivatives", call->name);
+        (void)fail(&x->solver.why, "this FMU was built for a scene without derivatives of its outputs, or with frictions, "
+                   "which have no adjoint");
         return component_no_value(c);
     }
     if (instance_factor(x) != OK || check_defined(x, unknowns, nUnknowns, &undefined) != OK)
