@@ -104,12 +104,13 @@ def test_the_commands_run_as_printed(tmp_path, monkeypatch, pages):
         assert ended.exit_code == 0, (command, ended.output[-1000:])
 
 
-def test_the_examples_run_as_printed(tmp_path, monkeypatch, native_fmu):
-    """The lines of Python that simulate FMUs, beside those that build_fmus.py made."""
+def test_the_examples_run_as_printed(tmp_path, monkeypatch, native_fmu, built):
+    """The lines of Python that simulate FMUs, beside those that were built before."""
     monkeypatch.chdir(tmp_path)
     Path("dist/native").mkdir(parents=True)
-    for name in ("Hemisphere", "CartPendulum"):
-        shutil.copy(native_fmu(name), "dist/native")
+    absorber = built(load(REPOSITORY / "tests" / "absorber.py").model)
+    for fmu in (native_fmu("Hemisphere"), native_fmu("CartPendulum"), absorber):
+        shutil.copy(fmu, "dist/native")
     blocks = [b for b in BLOCKS if "import fmpy" in b or "import EcosSimulation" in b]
     blocks = [b for b in blocks if "native-fmi3" not in b]  # test_fmi3.py runs it
     assert len(blocks) == 2
