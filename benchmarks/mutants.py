@@ -3,10 +3,11 @@
     python benchmarks/mutants.py [--stress] [--control] [WORD ...]
 
 Each defect of mutants.toml is made in a copy of the package, and the tests aimed at it run there until
-one fails.  Printed is a row a defect: what it breaks, and the test that noticed, or why none can.  WORD: only
-defects with one of these words in their file or description.  --stress: not the tests but `lagfmu stress`, of
-the models that a defect names.  --control: the same tests without any defect, first.  The exit code is 1 if a
-defect survives of which no reason is known, or one is found that was thought to make no difference.
+one fails.  Printed is a row a defect: what it breaks, and the test that noticed, or why none can; at the
+end, which were noticed only by tests without an end within 60 s of processor time.  WORD: only defects with
+one of these words in their file or description.  --stress: not the tests but `lagfmu stress`, of the models
+that a defect names.  --control: the same tests without any defect, first.  The exit code is 1 if a defect
+survives of which no reason is known, or one is found that was thought to make no difference.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import os
 import re
 import runpy
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -36,6 +38,7 @@ EVER_THE_SAME = (
     "typer",
 )
 PATIENCE = 60  # seconds of processor time, after which it is said to run without end
+ENDLESS = f"no end within {PATIENCE} s"
 STRICT = ("-std=c99", "-fsyntax-only", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror")
 
 
@@ -111,7 +114,8 @@ def _found_by_tests(tests: list[str], folder: Path) -> str:
     begun = re.findall(r"^tests/\S+::(\w+)", said, re.MULTILINE)
     if end >= 0 or not begun:
         raise RuntimeError(f"pytest {' '.join(tests)}: {said[-2000:]}")
-    return f"{begun[-1]} (signal {-end})"
+    stopped = -end in (signal.SIGXCPU, signal.SIGKILL)
+    return f"{begun[-1]} ({ENDLESS if stopped else f'signal {-end}'})"
 
 
 def _found_by_stress(model: str, folder: Path) -> str:
@@ -151,7 +155,7 @@ def main() -> int:
         defects = [d for d in defects if any(w in f"{d.file} {d.breaks}" for w in asked.words)]
     for name in EVER_THE_SAME:
         importlib.import_module(name)
-    surprises = 0
+    surprises, endless = 0, []
     with tempfile.TemporaryDirectory() as made:
         folder = Path(made)
         for name in COPIED:
@@ -181,9 +185,13 @@ def main() -> int:
             shutil.rmtree(folder / "made", ignore_errors=True)
             if not asked.stress:
                 surprises += bool(by) == bool(defect.survives)
+            if ENDLESS in by:
+                endless.append(f"{path.name}: {defect.breaks}")
             why = defect.survives or "?"
             shown = f"`{by}`" if by else f"**nothing**{'' if asked.stress else ': ' + why}"
             print(f"| {path.name} | {defect.breaks} | {shown} |", flush=True)
+        for line in [f"{ENDLESS}: {len(endless)} of {len(defects)}", *endless]:
+            print(line)
     return int(surprises > 0)
 
 

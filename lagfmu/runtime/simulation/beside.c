@@ -17,6 +17,10 @@ enum { BESIDE_ROUNDS = 3 };
 static const double BESIDE_STEP = 0x1p-14; /* of what y and p are large, and of the natural time, ... */
 static const double BESIDE_PACE = 0x1p-7;  /* ... and of that in which the rate of the limit changes */
 
+double saltation_size(const Solver *s, int parameter) {
+    return parameter >= 0 && s->p[parameter] != 0 ? fabs(s->p[parameter]) : 1;
+}
+
 double saltation_step(const Solver *s, Way way) {
     const double natural = s->state.now.rate > 0 ? s->state.now.rate : 1;
     double most = fabs(way.dt) * fmax(natural, s->saltation->pace * (BESIDE_STEP / BESIDE_PACE));
@@ -24,7 +28,7 @@ double saltation_step(const Solver *s, Way way) {
         const double size = fmax(fabs(way.y[j]), nominals_natural(s, j));
         if (size > 0) most = fmax(most, fabs(way.dy[j]) / size);
     }
-    if (way.parameter >= 0) most = fmax(most, 1 / (s->p[way.parameter] != 0 ? fabs(s->p[way.parameter]) : 1));
+    if (way.parameter >= 0) most = fmax(most, 1 / saltation_size(s, way.parameter));
     return most > 0 ? BESIDE_STEP / most : BESIDE_STEP;
 }
 

@@ -28,6 +28,8 @@ typedef struct {
     int flat;
 } Top;
 
+/* Extremes in a row: of quantity i/2 the largest, then the smallest. */
+static double sense_of(int i) { return i % 2 == 0 ? 1 : -1; }
 static PeakPart part_of(double sense) { return sense > 0 ? PEAK_MAX : PEAK_MIN; }
 static PeakPart time_of(double sense) { return sense > 0 ? PEAK_MAX_TIME : PEAK_MIN_TIME; }
 
@@ -108,8 +110,7 @@ static Status time_inside(Solver *s, int k, int c, const Top *top, double *later
 /* Two extremes that are the same to the tolerance: another number would make either the greater. */
 static int same_change(const Solver *s, int c, int k, double sense, double change) {
     const double *record = peak_record(s, k);
-    const int parameter = s->column[c].parameter;
-    const double size = parameter >= 0 && s->p[parameter] != 0 ? fabs(s->p[parameter]) : 1;
+    const double size = saltation_size(s, s->column[c].parameter);
     const double before = peak_change(s, c, k)[part_of(sense)];
     const double most = fmax(fmax(fabs(change), fabs(before)), fabs(record[part_of(sense)]) / size);
     return fabs(change - before) <= sqrt(s->settings.tolerance) * most;
@@ -149,8 +150,7 @@ static Status vary_left(Solver *s, int k, double sense, double near, int begun) 
     if (top.flat || kink || fabs(top.rate) > near * fabs(top.bend)) return OK;
     if (!begun) return vary_inside(s, k, sense, 0);
     for (int c = 0; c < s->peak_columns; c++) {
-        const int parameter = s->column[c].parameter;
-        const double size = parameter >= 0 && s->p[parameter] != 0 ? fabs(s->p[parameter]) : 1;
+        const double size = saltation_size(s, s->column[c].parameter);
         double later;
         if (s->peak_asked(c, k, (int)time_of(sense)) == NULL) continue;
         if (time_inside(s, k, c, &top, &later) != OK) return FAILED;
@@ -166,14 +166,14 @@ static Status vary_here(Solver *s, const int *which, int at_event) {
     if (at_event && s->measure_change(s, -1, x->peak_rates) != OK) return FAILED;
     for (int c = 0; c < s->peak_columns; c++) {
         if (s->measure_change(s, c, x->peak_changes) != OK) return FAILED;
-        for (int k = 0; k < s->peaks; k++)
-            for (int side = 0; side < 2; side++) {
-                const double sense = side == 0 ? 1 : -1, later = at_event ? x->dt[c] : 0;
-                if (!which[2 * k + side]) continue;
-                double *kept = peak_change(s, c, k);
-                kept[part_of(sense)] = x->peak_changes[k] + (at_event ? x->peak_rates[k] * later : 0);
-                kept[time_of(sense)] = later;
-            }
+        for (int i = 0; i < 2 * s->peaks; i++) {
+            const int k = i / 2;
+            const double later = at_event ? x->dt[c] : 0;
+            if (!which[i]) continue;
+            double *kept = peak_change(s, c, k);
+            kept[part_of(sense_of(i))] = x->peak_changes[k] + (at_event ? x->peak_rates[k] * later : 0);
+            kept[time_of(sense_of(i))] = later;
+        }
     }
     return OK;
 }
@@ -182,30 +182,28 @@ static Status vary_here(Solver *s, const int *which, int at_event) {
 static void vary_before(Solver *s, const int *which) {
     struct Saltation *x = s->saltation;
     for (int c = 0; c < s->peak_columns; c++)
-        for (int k = 0; k < s->peaks; k++)
-            for (int side = 0; side < 2; side++) {
-                const double sense = side == 0 ? 1 : -1;
-                if (!which[2 * k + side]) continue;
-                double *kept = peak_change(s, c, k);
-                kept[part_of(sense)] += x->peak_before[k] * x->dt[c];
-                kept[time_of(sense)] = x->dt[c];
-            }
+        for (int i = 0; i < 2 * s->peaks; i++) {
+            if (!which[i]) continue;
+            double *kept = peak_change(s, c, i / 2);
+            kept[part_of(sense_of(i))] += x->peak_before[i / 2] * x->dt[c];
+            kept[time_of(sense_of(i))] = x->dt[c];
+        }
 }
 
 static Status vary_by_kind(Solver *s, const int *which, PeakKind kind, double near) {
     int any = 0;
     if (kind == PEAK_GIVEN || kind == PEAK_EVENT) {
-        for (int k = 0; k < 2 * s->peaks; k++) any |= which[k];
+        for (int i = 0; i < 2 * s->peaks; i++) any |= which[i];
         return any ? vary_here(s, which, kind == PEAK_EVENT) : OK;
     }
-    for (int k = 0; k < s->peaks; k++)
-        for (int side = 0; side < 2; side++) {
-            const double sense = side == 0 ? 1 : -1;
-            if (!which[2 * k + side] || !(is_asked(s, k, part_of(sense)) || is_asked(s, k, time_of(sense)))) continue;
-            const Status status = kind == PEAK_LEFT || kind == PEAK_START ? vary_left(s, k, sense, near, kind == PEAK_START)
-                                                                           : vary_inside(s, k, sense, kind == PEAK_AGAIN);
-            if (status != OK) return FAILED;
-        }
+    for (int i = 0; i < 2 * s->peaks; i++) {
+        const int k = i / 2;
+        const double sense = sense_of(i);
+        if (!which[i] || !(is_asked(s, k, part_of(sense)) || is_asked(s, k, time_of(sense)))) continue;
+        const Status status = kind == PEAK_LEFT || kind == PEAK_START ? vary_left(s, k, sense, near, kind == PEAK_START)
+                                                                       : vary_inside(s, k, sense, kind == PEAK_AGAIN);
+        if (status != OK) return FAILED;
+    }
     return OK;
 }
 

@@ -39,6 +39,9 @@ static const double BESIDE_WEIGHT[BESIDE_POINTS] = {1.0 / 12, -8.0 / 12, 8.0 / 1
 /* The step for it, at which truncation and rounding are about 1e-12. */
 SHARED double saltation_step(const Solver *s, Way way);
 
+/* How large a parameter is; 1 for one that is 0, and for a start value (-1). */
+SHARED double saltation_size(const Solver *s, int parameter);
+
 /* What is known of a map: the state before it, from which it goes on unless it is a start. */
 typedef struct {
     Map map;
