@@ -3,8 +3,8 @@
  *
  *   scenario GUID STOP STEP STATES INDICATORS INPUT REFERENCE...
  *
- * INPUT: reference of a Real input, -1 without one, -2 if a step before STOP is to fail; REFERENCES:
- * Real outputs.  Ends with 0 if every answer is as it should be, otherwise with the line number of the
+ * INPUT: reference of a Real input, -1 without one, -2 if a step before STOP is to fail, -3 if the first
+ * of the REFERENCES is the angle of a joint, which is set at each start; REFERENCES: Real outputs.  Ends with 0 if every answer is as it should be, otherwise with the line number of the
  * first that is not. */
 #include <math.h>
 #include <stdio.h>
@@ -20,6 +20,7 @@ static int told;           /* messages so far */
 static size_t count;       /* of the references */
 static fmi2ValueReference references[MOST];
 static double step;
+static int by_joint;       /* 1: the first of them is set */
 
 static void *take(size_t number, size_t size) {
     blocks++;
@@ -51,7 +52,12 @@ static fmi2Component begin(const char *guid, fmi2Type type) {
     EXPECT(c != NULL);
     EXPECT(fmi2SetupExperiment(c, 1, 1e-8, 0, 0, 0) == fmi2OK);
     EXPECT(fmi2EnterInitializationMode(c) == fmi2OK);
+    const double angle = 2;
+    double found = angle;
+    if (by_joint) EXPECT(fmi2SetReal(c, references, 1, &angle) == fmi2OK);
     EXPECT(fmi2ExitInitializationMode(c) == fmi2OK);
+    EXPECT(fmi2GetReal(c, references, 1, &found) == fmi2OK);
+    EXPECT(!by_joint || fabs(found - angle) < 1e-12);
     return c;
 }
 
@@ -205,6 +211,7 @@ int main(int arguments, char **argument) {
     const char *guid = argument[1];
     const double stop = atof(argument[2]);
     const long input = atol(argument[6]);
+    by_joint = input == -3;
     step = atof(argument[3]);
     count = (size_t)(arguments - 7);
     for (size_t i = 0; i < count; i++)

@@ -15,6 +15,7 @@ from conftest import of_each_kind, scene_of
 from redundant import platform
 from runtime import FLAGS, RUNTIME_FILES, SANITIZE, compiler, objects
 from test_extremes import isosceles
+from test_joint_start import cart_arm
 from test_jumps import MODELS as JUMPS
 from test_speeds_native import ball, geared
 
@@ -42,6 +43,8 @@ LIVES = {  # steps that reach the event or the singular point in between
     "Peaks": 0.1,  # extremes, across impacts
     "Thrown": 0.1,  # speeds of a model's own, with contact and friction
     "Geared": 0.1,  # an angle that is unwrapped
+    "CartArm": 0.1,  # a start by one
+    "SliderCrankBodies": 0.1,  # by the angle of a joint that is no coordinate
     "Normal": 0.07,  # a scene: lambda of the hemisphere alone, numbers for m and g
     "Places": 0.1,  # a scene: coordinates that are only read, nothing is solved for lambda
 }
@@ -67,6 +70,7 @@ OWN = {
     "Peaks": peaks,
     "Thrown": ball,
     "Geared": geared,
+    "CartArm": cart_arm,
     **JUMPS,
 }
 
@@ -121,6 +125,9 @@ def arguments(description, step: float) -> list[str]:
     sizes = description.numberOfContinuousStates, description.numberOfEventIndicators
     if description.modelName == "Isosceles":
         stop, inputs = 3.0, ["-2"]
+    if description.modelName in ("CartArm", "SliderCrankBodies"):
+        set_first = next(str(v.valueReference) for v in real if v.name in ("angle.B", "angle.A"))
+        inputs, outputs = ["-3"], [set_first, *outputs]
     return [
         description.guid,
         str(stop),
