@@ -10,7 +10,7 @@ from math import pi
 from sympy import asin, cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import ClosedForm, Conserved, Scene, output
+from lagfmu import ClosedForm, Conserved, Page, Scene, output
 from lagfmu.bodies import Body, Gravity, Ground, Prismatic, Revolute, mechanism
 
 ground = Ground()
@@ -30,6 +30,10 @@ model = mechanism(
     loads=[Gravity((0, -9.81))],
     start={"angle.A": pi / 4, "der(angle.A)": 10.0},
     description="Slider-crank of bodies and joints, with the force in each joint",
+    page=Page(
+        sliders=["crank.mass", "rod.mass", "piston.mass", "der(crank.orientation.z)"],
+        curves=["force.A.norm", "force.B.norm", "force.C.norm", "force.D.norm", "torque.D.z"],
+    ),
 )
 
 scenes = [Scene("SliderCrankBodies", stop_time=2.0, step_size=0.01)]

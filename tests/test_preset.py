@@ -70,6 +70,20 @@ def test_a_scene_leaves_out_what_its_fmu_does_not_have() -> None:
     assert made["curves"] == ["lambda.surface", "theta"]
 
 
+@pytest.mark.parametrize(
+    ("name", "narrower", "left"),
+    [
+        ("slider_crank", {"outputs": ["phi"]}, ["x", "y"]),
+        ("belt", {"frictions": []}, ["lambda.ride", "x"]),
+    ],
+)
+def test_a_narrower_scene_keeps_what_it_can_of_the_page(name, narrower, left) -> None:
+    """An FMU without outputs of the model's own, one without those of frictions: the page names both."""
+    made = preset_of(prepare(model_file(name).model, Scene("Some", **narrower)))
+    assert made is not None
+    assert made["curves"] == left
+
+
 def test_names_that_are_none_are_told_with_those_that_are_meant() -> None:
     """All at once, each with what may have been meant; a pattern means all that fit."""
     wrong = Page(

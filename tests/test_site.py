@@ -61,7 +61,7 @@ def test_the_site_builds_strictly(site: Path) -> None:
     assert 'href="../gallery/hoop.html"' in (site / "mechanics" / "index.html").read_text("utf-8")
     lesson = (site / "mechanics" / "hemisphere" / "index.html").read_text("utf-8")
     assert 'href="../hemisphere.ipynb"' in lesson
-    assert "<details><summary>Answer</summary>\n<p>" in lesson
+    assert "<details>\n<summary>Answer</summary>\n<p>" in lesson
 
 
 SHOWN = """() => [...document.querySelectorAll("picture img")].map((e) => [

@@ -9,7 +9,10 @@ import math
 from typing import Any
 
 from ..errors import BuildError, ModelError
+from ..interface.table import variable_table
+from ..mechanics.form import Form
 from ..model.page import told
+from ..model.scene import EVERYTHING
 from ..model.selection import select
 from ..prepare.prepare import Prepared
 
@@ -23,14 +26,17 @@ def preset_of(prepared: Prepared) -> Preset | None:
     page = prepared.model.page
     if page is None:
         return None
-    variables = prepared.whole.variables
-    settable = [v.name for v in variables if v.role in SETTABLE]
-    readable = [v.name for v in variables if v.causality == "output"]
+    tables = [prepared.whole]
+    if not prepared.scene.complete:
+        tables.append(variable_table(Form(prepared.derived), prepared.asked))
+    variables = {v.name: v for table in tables for v in table.variables}
+    settable = [n for n, v in variables.items() if v.role in SETTABLE]
+    readable = [n for n, v in variables.items() if v.causality == "output"]
     problems: list[str] = []
     sliders = [n for v in page.sliders for n in select([told(v)], settable, "slider", problems)]
     curves = [n for v in page.curves for n in select([told(v)], readable, "curve", problems)]
     select([told(v) for v in page.ranges], settable, "the slider of a range", problems)
-    if problems:
+    if problems and tuple(prepared.asked.frictions) == EVERYTHING:  # else it has outputs of others
         raise ModelError(prepared.model.name, [f"page: {p}" for p in problems])
     return {
         "sliders": [n for n in dict.fromkeys(sliders) if n in prepared.table],
