@@ -230,6 +230,15 @@ def test_other_values_are_near_within_bounds_and_keep_the_contacts(native_fmu):
             assert run["contact.surface"][0]
 
 
+def test_other_values_of_a_mechanism_are_those_of_its_coordinates(native_fmu):
+    """Joints that are all moved by themselves would not close."""
+    with opened(native_fmu("SliderCrankBodies")) as session:
+        scene = observe(session, Setting("", 0.0, 0.0, 0.01), stop=0.01)
+        values = other_values(session, scene, random.Random(1))
+        assert "crank.orientation.z" in values
+        assert not [n for n in values if "angle." in n or "position.D" in n]
+
+
 @pytest.fixture(scope="module")
 def choices():
     """The pendulum, chosen for 1e-4 and for 1e-9 of lambda."""

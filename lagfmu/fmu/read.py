@@ -104,10 +104,12 @@ def has_error_bars(variables: Sequence[Any]) -> bool:
     return any(names.barred(n) in known for n in known)
 
 
-def is_joint_start(description: Any, name: str) -> bool:
-    """True of a start value that is no state's: of the angle of a joint, which speaks for coordinates."""
+def joint_starts(description: Any) -> set[str]:
+    """The joint coordinates that may be set as start values, and their rates: such a rate is no state."""
     states = {u.variable.derivative.name for u in description.derivatives}
-    return bool(states) and name not in states
+    given = {v.name for v in description.modelVariables if v.initial in ("exact", "approx")}
+    rates = {n for n in given - states if states and names.read(n).order == 1}
+    return rates | {names.read(n).coordinate for n in rates}
 
 
 def described_rules(description: Any) -> dict[str, Rule]:

@@ -13,7 +13,7 @@ from ...fmu.closed_forms import CarriedForm, unpack_closed_forms
 from ...fmu.read import (
     experiment_of,
     file_stem,
-    is_joint_start,
+    joint_starts,
     kind_of,
     read_description,
     target_in,
@@ -118,6 +118,7 @@ def facts_of(path: Path) -> Facts:
         v.name for v in reals if names.derivative(v.name, 2) in variables and v.causality != "input"
     )
     moving = {*coordinates, *(names.derivative(c) for c in coordinates)}
+    moving -= joint_starts(description)  # which speak for coordinates
     inputs = [v.name for v in reals if v.causality == "input"]
     rates = [names.derivative(name, k) for name in inputs for k in (1, 2)]
     estimated = tuple(n for n in rates if n in variables and n not in inputs)
@@ -137,11 +138,7 @@ def facts_of(path: Path) -> Facts:
             for v in reals
             if v.causality == "parameter" and names.read(v.name).head != names.SOLVER
         ),
-        starts=tuple(
-            _settable(v)
-            for v in reals
-            if v.name in moving and v.start is not None and not is_joint_start(description, v.name)
-        ),
+        starts=tuple(_settable(v) for v in reals if v.name in moving and v.start is not None),
         inputs=tuple(_settable(v) for v in reals if v.causality == "input"),
         motions=_motions([*inputs, *estimated]),
         estimated=estimated,

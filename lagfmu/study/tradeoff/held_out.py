@@ -10,7 +10,7 @@ import numpy as np
 
 from ... import names
 from ...errors import SimulationError
-from ...fmu.read import Trajectory, is_joint_start, kind_of
+from ...fmu.read import Trajectory, joint_starts, kind_of
 from ...fmu.session import Session
 from .observe import observe
 from .reference import Reference, refer
@@ -69,13 +69,11 @@ def _drawn(session: Session, scene: Trajectory, chance: random.Random) -> dict[s
         for v in session.description.modelVariables
         if kind_of(v) == "Real" and v.start is not None and names.read(v.name).head != names.SOLVER
     ]
-    outputs = scene.dtype.names or ()
+    outputs, joints = scene.dtype.names or (), joint_starts(session.description)
     starts = [
         v
         for v in given
-        if v.initial in ("exact", "approx")
-        and v.name in outputs
-        and not is_joint_start(session.description, v.name)
+        if v.initial in ("exact", "approx") and v.name in outputs and v.name not in joints
     ]
     still = all(float(v.start) == 0 for v in starts)
     values: dict[str, float] = {}
