@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 from browser import Page
+from conftest import of_each_kind
 
 from lagfmu.testing import Prepared, with_figures
 from lagfmu.testing import documentation_page as documentation
@@ -15,6 +16,7 @@ from lagfmu.testing import documentation_page as documentation
 Opened = Callable[..., Page]
 PHONE = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True}
 LYING = {**PHONE, "viewport": {"width": 844, "height": 390}}
+SLID = ("Hemisphere", "SliderCrank", "Gyroscope")
 SEEN = """async () => {
     const seen = (e) => {
         const box = e.getBoundingClientRect();
@@ -38,8 +40,13 @@ SMALL = """() => [...document.querySelectorAll("input, select, button, summary")
     .map(([text]) => text)"""
 
 
-@pytest.mark.parametrize("screen", [PHONE, LYING], ids=["upright", "lying"])
-@pytest.mark.parametrize("name", ["Hemisphere", "SliderCrank", "Gyroscope"])
+@pytest.mark.parametrize(
+    ("name", "screen"),
+    [
+        *of_each_kind(SLID, PHONE, label="upright", kinds=SLID),
+        *of_each_kind(SLID, LYING, label="lying", kinds=("Gyroscope",)),
+    ],
+)
 def test_who_moves_a_slider_sees_the_motion(name: str, screen: Any, opened: Opened) -> None:
     """On a phone, whichever slider has the focus: it, the whole picture, a curve and the time are on the
     screen together, and nothing lies over them."""
@@ -79,7 +86,10 @@ COVERED = """() => {
 }"""
 
 
-@pytest.mark.parametrize("name", ["Bowling", "HalfCar", "RollingSphere", "Chain"])
+@pytest.mark.parametrize(
+    "name",
+    of_each_kind(["Bowling", "HalfCar", "RollingSphere", "Chain"], kinds=("HalfCar", "Chain")),
+)
 def test_no_label_stands_on_a_body(name: str, opened: Opened) -> None:
     """At every time the names and values of the arrows stand beside disks and bobs, and beside each other."""
     page = opened(name, viewport={"width": 1280, "height": 844})
@@ -163,7 +173,11 @@ def test_one_dot_is_told_from_two(opened: Opened) -> None:
 
 @pytest.mark.parametrize(
     ("name", "width", "theme"),
-    [("Belt", 390, "light"), ("Belt", 1280, "dark"), ("Gyroscope", 390, "dark")],
+    [
+        ("Belt", 390, "light"),
+        pytest.param("Belt", 1280, "dark", marks=pytest.mark.thorough),
+        ("Gyroscope", 390, "dark"),
+    ],
 )
 def test_nothing_of_a_page_keeps_a_reader_out(
     name: str, width: int, theme: str, opened: Opened
@@ -178,7 +192,7 @@ def test_nothing_of_a_page_keeps_a_reader_out(
     assert page.violations() == []
 
 
-@pytest.mark.parametrize("theme", ["light", "dark"])
+@pytest.mark.parametrize("theme", of_each_kind(["light", "dark"], kinds=("dark",)))
 def test_nothing_of_the_documentation_keeps_a_reader_out(
     theme: str, prepared: Callable[[str], Prepared], browser: Any, tmp_path: Path
 ) -> None:

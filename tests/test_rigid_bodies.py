@@ -155,7 +155,7 @@ def test_a_wheel_loads_its_suspension_as_newton_and_euler_say(native_fmu):
     ("make", "tolerance"),
     [
         (iftomm.pendulum, 1e-12),
-        (iftomm.windows, 1e-12),
+        pytest.param(iftomm.windows, 1e-12, marks=pytest.mark.thorough),
         pytest.param(iftomm.squeezer, 1e-12, marks=pytest.mark.thorough),
         pytest.param(iftomm.bricard, 1e-10, marks=pytest.mark.thorough),
         pytest.param(iftomm.governor, 1e-12, marks=pytest.mark.thorough),
@@ -172,6 +172,7 @@ def test_the_iftomm_benchmarks_press_their_joints_as_other_equations_say(make, t
     assert found == pytest.approx(wanted, rel=0, abs=ALLOWED * size)
 
 
+@pytest.mark.thorough
 @pytest.mark.filterwarnings("ignore::lagfmu.testing.RedundantConstraintWarning")
 def test_what_forces_hold_still_does_not_hold_up_the_motion(built):
     """Bricard's linkage begins with bars at rest between forces that cancel: their rounding is no motion, and

@@ -129,7 +129,9 @@ def test_a_small_error_of_an_output_is_found(bench, column, factor, what):
     [
         ("FallingRod", ["margin.grip", "power.grip"]),
         ("Bowling", ["margin.grip", "power.grip"]),
-        ("CrankWithBearingFriction", ["power.A", "power.D"]),
+        pytest.param(
+            "CrankWithBearingFriction", ["power.A", "power.D"], marks=pytest.mark.thorough
+        ),
         ("RotatingWire", ["bead.speed", "motor.power"]),
         ("Atwood", ["der(x1,2)"]),
     ],
