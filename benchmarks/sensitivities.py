@@ -45,9 +45,8 @@ from lagfmu.prepare.prepare import prepare
 
 STENCIL = np.array([-2.0, -1.0, 0.0, 1.0, 2.0])
 WEIGHTS = np.array([1.0, -8.0, 0.0, 8.0, -1.0]) / 12
-NOISE = np.array([1.0, -4.0, 6.0, -4.0, 1.0]) / np.sqrt(
-    70
-)  # what no polynomial of third order explains
+# what no polynomial of third order explains
+NOISE = np.array([1.0, -4.0, 6.0, -4.0, 1.0]) / np.sqrt(70)
 PAIRS = ((3e-5, 1e-5), (1e-3, 3e-4))  # of a number's size
 TOLERANCE, REFERENCE = 1e-11, 1e-13
 AGREED, KNOWN, TRUSTED, ROUNDED = 1e-6, 1e-4, 3.0, 1e-11

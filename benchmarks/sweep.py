@@ -40,9 +40,8 @@ from lagfmu.prepare.prepare import prepare
 HERE = Path(__file__).parent
 STOP, FIRST, LAST = 2.0, 0.05, 1.0
 WANTED = ["lambda.surface", "departure.surface.time"]
-Costs = dict[
-    str, list[tuple[float, float]]
-]  # processor time and wall time of a run [us], a round each
+# processor time and wall time of a run [us], a round each
+Costs = dict[str, list[tuple[float, float]]]
 ONE, EVERY = "lagfmu.sweep, one core", "lagfmu.sweep, all cores"
 KEEP = ["lambda.surface:max", "departure.surface.time:last"]
 

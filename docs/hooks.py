@@ -27,10 +27,8 @@ MODELS = Path(__file__).parent.parent / "models"
 MODEL = re.compile(r"\[([^\]]+)\]\((?:\.\./)+models/(\w+)\.py\)")
 ROWS = re.compile(r"(?:^\|.*\|\n)+", re.MULTILINE)
 ROW = re.compile(rf"^\| {MODEL.pattern} \| (.*) \|$", re.MULTILINE)
-FILMS = {
-    "index.md": "hemisphere",
-    "mechanics.md": "hoop",
-}  # in place of a page's figure of this name
+# in place of a page's figure of this name
+FILMS = {"index.md": "hemisphere", "mechanics.md": "hoop"}
 STILL = 0.4  # of a film: the frame for those who want nothing to move
 EMPTY_HEAD = re.compile(r"<thead>\s*<tr>(?:\s*<th[^>]*></th>)+\s*</tr>\s*</thead>")
 EMPTY_HEADING = re.compile(r"<th[^>]*></th>")

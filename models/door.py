@@ -36,9 +36,8 @@ pull = -m * rate**2 * radius  # towards the hinges
 sums = {"x": pull * cos(angle), "y": pull * sin(angle), "z": -m * g}
 weight = output("force.lower.norm") + output("force.upper.norm")
 # Moments about the lower hinge: of both hinges, and of what the mass needs at its centre, -low above it.
-across = [
-    output(f"torque.lower.{x}") + output(f"torque.upper.{x}") for x in ("x", "y")
-]  # the upper hinge's force acts at the height high - low
+# the upper hinge's force acts at the height high - low
+across = [output(f"torque.lower.{x}") + output(f"torque.upper.{x}") for x in ("x", "y")]
 height = high - low
 moments = {
     "x": across[0] - height * output("force.upper.y"),

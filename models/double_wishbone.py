@@ -33,10 +33,8 @@ WAY = [0, 2, 3, 4, 5, 5.5, 6, 6.5, 7, 8, 9, 10, 20, 30]
 HEIGHT = [0, 0, 0, 0, 0, 0.04, 0.08, 0.04, 0, 0, 0, 0, 0, 0]
 road = Spline("road", WAY, HEIGHT, "m", "m")
 
-WHEEL, MASS = (
-    (0.01, 0.76, 0.31),
-    (0.004, 0.73, 0.32),
-)  # centres of the wheel and of the upright's mass
+# centres of the wheel and of the upright's mass
+WHEEL, MASS = (0.01, 0.76, 0.31), (0.004, 0.73, 0.32)
 LOW, HIGH = (0.01, 0.70, 0.20), (0.03, 0.66, 0.55)  # the balls of the upright
 ARM, RACK = (-0.13, 0.68, 0.26), (-0.12, 0.36, 0.27)  # the ends of the tie rod
 lower_hinge = {"point": (0.0, 0.35, 0.22), "axis": (1.0, 0.05, 0.02)}

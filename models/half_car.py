@@ -38,10 +38,8 @@ HEIGHT = [0, 0, 0, 0, 0, 0, 0, 0, 0.04, 0.09, 0.04, 0, 0, 0, 0, 0, 0, 0, 0, 0]
 SPEED = 14.0  # [m/s]
 road = Spline("road", WAY, HEIGHT, "m", "m")
 
-df, dr = (
-    zf - z - a * theta,
-    zr - z + b * theta,
-)  # the springs' compression beyond that of the car at rest
+# the springs' compression beyond that of the car at rest
+df, dr = zf - z - a * theta, zr - z + b * theta
 load_f, load_r = M * g * b / (a + b), M * g * a / (a + b)  # of the springs at rest
 push_f = load_f + k * df + c * df.diff(t)
 push_r = load_r + k * dr + c * dr.diff(t)

@@ -18,9 +18,8 @@ low, high, h, sway, w = symbols("low high height sway rate", real=True)
 roll = sin(w * t) / 5
 position = Matrix([sway * sin(w * t), sway * sin(2 * w * t), h + sway * sin(3 * w * t)])
 turn = Matrix([[1, 0, 0], [0, cos(roll), -sin(roll)], [0, sin(roll), cos(roll)]])
-NEAR = (
-    pi / 12
-)  # by which two feet stand off each of three directions, and two heads off those between
+# by which two feet stand off each of three directions, and two heads off those between
+NEAR = pi / 12
 
 
 def around(radius, off):

@@ -124,9 +124,8 @@ def _rheonomic(p: Parts) -> None:
 
 
 def _jump(p: Parts) -> None:
-    p.push(
-        x, k * d * Heaviside(x - d)
-    )  # away from its surface: one that holds a motion there is no jump
+    # away from its surface: one that holds a motion there is no jump
+    p.push(x, k * d * Heaviside(x - d))
 
 
 def _blade(p: Parts) -> None:

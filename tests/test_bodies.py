@@ -144,9 +144,8 @@ def test_a_slide_on_an_incline_takes_the_moment_of_an_eccentric_body():
     assert run["position.D"] == pytest.approx(g / 4 * run["time"] ** 2, rel=1e-9)
     assert run["force.D.y"] == pytest.approx(2 * g * cos(pi / 6), rel=1e-12)
     np.testing.assert_allclose(run["force.D.x"], 0)
-    moment = (
-        0.1 * 2 * g * sin(pi / 6) - 0.1 * 2 * g / 2
-    )  # of gravity and of the inertia, at the marker
+    # of gravity and of the inertia, at the marker
+    moment = 0.1 * 2 * g * sin(pi / 6) - 0.1 * 2 * g / 2
     np.testing.assert_allclose(run["torque.D.z"], moment, atol=1e-12)
 
 

@@ -283,9 +283,8 @@ def derivative(e: Any, point: Point, values: dict[Any, Any]) -> tuple[float, flo
     present = {s: d for s, d in point.changes().items() if e.has(s)}
     if not present:
         return 0.0, 1e-300
-    if e.has(
-        SplineBase
-    ):  # a table has double precision: no limit, but the sum of partial derivatives
+    if e.has(SplineBase):
+        # a table has double precision: no limit, but the sum of partial derivatives
         terms = [sp.N(e.diff(s).xreplace(values), 30) * d for s, d in present.items()]
         return float(sum(terms)), max(math.fsum(abs(float(x)) for x in terms), 1.0)
     h = sp.Rational(1, 10**20)

@@ -21,11 +21,8 @@ from lagfmu.testing import happened
 
 Fmu = Callable[[str], Path]
 G = 9.81
-FALL, SPEED, E = (
-    np.sqrt(2 / G),
-    np.sqrt(2 * G),
-    0.7,
-)  # of a ball that falls 1 m and keeps E of its speed
+# of a ball that falls 1 m and keeps E of its speed
+FALL, SPEED, E = np.sqrt(2 / G), np.sqrt(2 * G), 0.7
 
 x, z = dynamicsymbols("x z")
 m, g = symbols("m g", positive=True)

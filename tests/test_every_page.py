@@ -192,9 +192,8 @@ def test_it_fits_the_screen(width: int, theme: str, page: Page) -> None:
     """At 400 pixels and on a desktop nothing is cut off sideways, and the theme is the reader's."""
     page.tab.set_viewport_size({"width": width, "height": 900})
     page.tab.emulate_media(color_scheme=theme)
-    page.until(
-        f"document.documentElement.scrollWidth <= {width}"
-    )  # charts follow in the next frame
+    # charts follow in the next frame
+    page.until(f"document.documentElement.scrollWidth <= {width}")
     paper = page.tab.evaluate("() => getComputedStyle(document.body).backgroundColor")
     light = sum(int(c) for c in paper.removeprefix("rgb(").removesuffix(")").split(",")) > 384
     assert light == (theme == "light")

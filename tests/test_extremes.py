@@ -189,9 +189,8 @@ def exponents(path: Path) -> tuple[dict[str, tuple[float, ...]], dict[str, float
     for v in description.modelVariables:
         base = units.get(v.unit)
         found[v.name] = (0, 0, 0) if base is None else (base.kg, base.m, base.s)
-        follows = (v.description or "").endswith(
-            names.FOLLOWS
-        )  # a start of parameters goes with them
+        # a start of parameters goes with them
+        follows = (v.description or "").endswith(names.FOLLOWS)
         if v.type == "Real" and v.start is not None and not follows and "solver." not in v.name:
             starts[v.name] = float(v.start)
     return found, starts
@@ -558,9 +557,8 @@ def test_a_singular_configuration_is_passed_smoothly_at_every_tolerance(built, d
         )
     found = [set(re.findall(r"'(\w+)'", part)) for text in log for part in text.split("; at t")]
     assert all(rows - {"crank", "again"} == {"coupler", "rocker"} for rows in found)
-    assert all(
-        len(rows) == 3 for rows in found
-    )  # "again" says the same as "crank": one of them is named
+    # "again" says the same as "crank": one of them is named
+    assert all(len(rows) == 3 for rows in found)
     told = [float(t) for text in log for t in re.findall(r"at t = (\S+) s the motion passes", text)]
     told, passed = ([t for t in times if t < 1.5] for times in (told, passed))
     assert told == pytest.approx(passed, abs=max(1e2 * tolerance, 1e-7))

@@ -307,10 +307,8 @@ def test_a_step_that_cannot_be_leaves_everything_as_it_was(pendulum):
     time, ended = c_double(), c_int(1)
     one.does("GetRealStatus", 2, byref(time))
     one.does("GetBooleanStatus", 3, byref(ended))
-    assert (time.value, ended.value) == (
-        0.1,
-        1,
-    )  # whoever tries the same step again would never end
+    # whoever tries the same step again would never end
+    assert (time.value, ended.value) == (0.1, 1)
     for _ in range(9):
         for each in (one, calm):
             each.step(0.1)

@@ -52,9 +52,8 @@ def departure() -> tuple[float, float]:
         theta = mpmath.acos(2 * mpmath.cos(theta0) / 3)
         end = mpmath.sqrt(theta - theta0)
 
-        def slowness(
-            s,
-        ):  # theta = theta0 + s^2, 2 g (cos(theta0) - cos(theta)) without cancellation
+        def slowness(s):
+            # theta = theta0 + s^2, 2 g (cos(theta0) - cos(theta)) without cancellation
             energy = 4 * g * mpmath.sin(theta0 + s * s / 2) * mpmath.sin(s * s / 2)
             return 2 * s / mpmath.sqrt(energy)
 

@@ -210,9 +210,8 @@ def test_each_binary_is_for_its_platform_and_exports_fmi_alone(built_for, folder
     assert [(b.system, b.machine, b.oldest) for b in found] == MADE_FOR[folder]
     assert len(EXPORTS) == 45
     for b in found:
-        own = (
-            {"__dso_handle", "_mh_dylib_header"} if b.system == "darwin" else set()
-        )  # the linker's
+        # the linker's
+        own = {"__dso_handle", "_mh_dylib_header"} if b.system == "darwin" else set()
         assert b.exports - own == EXPORTS
         for needed in b.needs:
             assert needed in SYSTEM_LIBRARIES or needed.startswith("api-ms-win-crt-"), needed

@@ -59,15 +59,8 @@ TRIED_ELSEWHERE = (
     "optuna",
     "gemseo_fmu",
 )  # with FMUs, as printed
-LONG = (
-    "tradeoff",
-    "stress",
-    "sweep",
-    "sensitivity",
-    "fit",
-    "report",
-    "page",
-)  # studies: tried in tests of their own
+# studies: tried in tests of their own
+LONG = ("tradeoff", "stress", "sweep", "sensitivity", "fit", "report", "page")
 
 
 def quick(command: list[str]) -> bool:

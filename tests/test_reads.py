@@ -194,9 +194,8 @@ def test_feet_are_settled_together(built: Built) -> None:
             setting(one, F=F, T=T)
             weight = m * G - F
             shares = np.array([weight + T / b, weight - T / b]) / 2
-            if (
-                shares.min() < 0 < weight + abs(T) / b
-            ):  # about one foot: z'' = -+ b a, J a = T -+ b N
+            if shares.min() < 0 < weight + abs(T) / b:
+                # about one foot: z'' = -+ b a, J a = T -+ b N
                 lone = (weight / m + b * abs(T) / J) / (1 / m + b**2 / J)
                 shares = np.where(shares == shares.max(), max(lone, 0.0), 0.0)
             shares = np.maximum(shares, 0.0)

@@ -151,9 +151,8 @@ def test_the_flight_after_the_departure(varied):
     found = run(varied("Hemisphere", *(f"{n}:a" for n in names)), 1.0, 4, {"theta": 0.3})[-1]
     spin = found["departure.surface.velocity.theta"]
     assert abs(found["sensitivity.departure.surface.theta.by.a"]) < 1e-10
-    of_spin = found[
-        "sensitivity.departure.surface.velocity.theta.by.a"
-    ]  # spin = sqrt(g cos(theta)/a)
+    # spin = sqrt(g cos(theta)/a)
+    of_spin = found["sensitivity.departure.surface.velocity.theta.by.a"]
     assert abs(of_spin + spin / 2) < 1e-10
 
     def height(a: float) -> float:  # r at t = 1, in units of a a function of t sqrt(g/a)

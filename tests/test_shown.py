@@ -41,9 +41,8 @@ def test_an_equation_is_broken_before_its_operators() -> None:
     ]
     assert wrapped(text, 30)[-2:] == ["+ (a + b + c + d + e + f + g", "  + h + i) lambda_2"]
     assert wrapped("", 10) == [""]
-    assert wrapped("a" * 20, 10) == [
-        "a" * 20
-    ]  # one word longer than a line is left to the terminal
+    # one word longer than a line is left to the terminal
+    assert wrapped("a" * 20, 10) == ["a" * 20]
 
 
 @pytest.mark.parametrize("width", [60, 80, 120])

@@ -44,12 +44,8 @@ PINS = (
     ("P4", 2, -0.028 + 0j, 4, -0.02j),
     ("P6", 2, -0.028 + 0j, 6, 0.02 + 0j),
 )
-TORQUE, STIFFNESS, FREE, HOOK = (
-    0.033,
-    4530.0,
-    0.07785,
-    0.02 - 0.018j,
-)  # the spring's hook is on body 3
+# the spring's hook is on body 3
+TORQUE, STIFFNESS, FREE, HOOK = 0.033, 4530.0, 0.07785, 0.02 - 0.018j
 PUBLISHED = {
     "angle": 15.81077119629904,
     "P3": 199.1753333731910 - 29.75531228015052j,

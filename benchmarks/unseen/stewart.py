@@ -74,9 +74,8 @@ model = Model(
 
 scenes = [Scene("Stewart", stop_time=1.0, step_size=0.01)]
 
-pushes = sum(
-    Abs(output(f"Q.leg{k}.z")) for k in range(1, 7)
-)  # where legs meet, far larger than their sum
+# where legs meet, far larger than their sum
+pushes = sum(Abs(output(f"Q.leg{k}.z")) for k in range(1, 7))
 closed_forms = [
     ClosedForm("weight", m * (z.diff(t, 2) + g), actual=output("Q.z"), scale=m * g + pushes),
 ]

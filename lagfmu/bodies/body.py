@@ -11,9 +11,8 @@ from typing import Any
 
 from ..model.elements import Expr, Parameter
 
-Number = (
-    float | Expr | Parameter
-)  # a Parameter, an expression of such, or a number that becomes one
+# a Parameter, an expression of such, or a number that becomes one
+Number = float | Expr | Parameter
 
 
 @dataclass(frozen=True, eq=False)

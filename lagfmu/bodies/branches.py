@@ -22,10 +22,8 @@ from .rows import Array, Rows
 
 CLOSED = 1e-9  # of the size of the mechanism: what a row may miss, and a given value be another
 DRAWS, MOST = 8, 60  # beginnings; speeds of a mechanism beyond which it is not looked for
-NEAR, ANOTHER = (
-    2.0,
-    1e-3,
-)  # times as far as the branch that is taken; what makes another one, of its way
+# times as far as the branch that is taken; what makes another one, of its way
+NEAR, ANOTHER = 2.0, 1e-3
 
 
 class SecondBranchWarning(LagfmuWarning):

@@ -129,11 +129,8 @@ OPTIONS = {
     "name": Name,
 }  # in the order of --help
 LISTS = ("outputs", "fixed", "inputs", "contacts", "frictions", "methods")
-NARROWING = (
-    *LISTS,
-    "method",
-    "reals_only",
-)  # an FMU with one of these shows less than the full one
+# an FMU with one of these shows less than the full one
+NARROWING = (*LISTS, "method", "reals_only")
 Needs = Mapping[str, Any]
 
 

@@ -45,9 +45,8 @@ def pack(contents: Mapping[str, bytes]) -> bytes:
             info.create_system = 3
             info.external_attr = 0o644 << 16
             info.compress_type = zipfile.ZIP_DEFLATED
-            archive.writestr(
-                info, contents[name], compresslevel=9
-            )  # that of `archive` is not taken
+            # that of `archive` is not taken
+            archive.writestr(info, contents[name], compresslevel=9)
     return buffer.getvalue()
 
 

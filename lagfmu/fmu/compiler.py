@@ -59,10 +59,8 @@ HOT = {  # where the time of a step and of a communication point goes; all else 
 HINTED = "-finline-hint-functions"  # clang: inline what is declared so, not each helper at each of its calls
 
 SHARED = ("-shared", "-s", "-Os")  # -Os is for what the compiler adds of its own
-NO_UNWINDING = (
-    "-fno-asynchronous-unwind-tables",
-    "-fno-unwind-tables",
-)  # Windows cannot do without
+# Windows cannot do without
+NO_UNWINDING = ("-fno-asynchronous-unwind-tables", "-fno-unwind-tables")
 
 
 @dataclass(frozen=True)

@@ -227,9 +227,8 @@ def _on(h: Expr, generator: random.Random) -> dict[Expr, Expr] | None:
             if slope != 0:
                 return {**rest, s: -h.xreplace({s: sp.S.Zero}).xreplace(rest) / slope}
     f = sp.lambdify(symbols, h, "math")
-    for _ in range(
-        TRIALS
-    ):  # two points on different sides, then bisection along the line between them
+    for _ in range(TRIALS):
+        # two points on different sides, then bisection along the line between them
         a, b = (_scattered({*symbols}, generator) for _ in range(2))
         try:
             at = [float(f(*(float(x) for x in p.values()))) for p in (a, b)]

@@ -25,10 +25,8 @@ from .spline import Spline, splines_in
 from .symbols import known_symbols, symbols_in, undeclared
 from .units import ENERGY, POWER, Unit, check_dimension, declared_unit, parse_unit, plain
 
-RATES = (
-    "given",
-    "estimated",
-)  # of a prescribed motion: inputs too, or from the communication points
+# of a prescribed motion: inputs too, or from the communication points
+RATES = ("given", "estimated")
 
 
 def problems_of(model: ModelFields) -> list[str]:

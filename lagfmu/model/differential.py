@@ -18,12 +18,8 @@ from ..errors import DerivationError
 from .attitude import Attitude, AttitudeChange, ClosedFunction
 from .elements import Expr
 
-CONSTANT_PIECES = (
-    sp.sign,
-    sp.Heaviside,
-    sp.floor,
-    sp.ceiling,
-)  # their jumps are not differentiated
+# their jumps are not differentiated
+CONSTANT_PIECES = (sp.sign, sp.Heaviside, sp.floor, sp.ceiling)
 
 
 class Differential:

@@ -113,9 +113,8 @@ def natural(
             A = pull  # at rest: what is left is rounding of forces that cancel
         rate = max(steady, pull / V if V > 0 else 0.0)
         if rate > 0:
-            rate = max(
-                rate, slowest
-            )  # one that is hardly pushed moves no farther than the others do
+            # one that is hardly pushed moves no farther than the others do
+            rate = max(rate, slowest)
             size[j] = max(V / rate, A / rate / rate)
         fastest = max(fastest, rate)
     pull = np.abs(now.vdot)

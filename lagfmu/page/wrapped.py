@@ -7,11 +7,8 @@ from dataclasses import dataclass
 
 from rich.cells import cell_len
 
-KINDS = {
-    "=≤≥<>≠": 0,
-    "+-−±": 1,
-    "/·∧": 4,
-}  # of breaks before operators; between factors or words: 5
+# of breaks before operators; between factors or words: 5
+KINDS = {"=≤≥<>≠": 0, "+-−±": 1, "/·∧": 4}
 OPERATORS = "".join(KINDS)
 OPEN, CLOSE = "([{", ")]}"
 LEVEL = 4.0  # kinds of operators a level

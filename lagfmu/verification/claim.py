@@ -19,9 +19,8 @@ from .check import Check, Missed
 from .closed_forms import first_miss
 from .evaluate import evaluate
 
-Values = Callable[
-    [str], NDArray[np.float64]
-]  # of the formula of a key, at the points of a statement
+# of the formula of a key, at the points of a statement
+Values = Callable[[str], NDArray[np.float64]]
 
 
 @dataclass(frozen=True)

@@ -94,9 +94,8 @@ def applies(
         chosen &= closed(closed_form.while_closed)
     if closed_form.while_open is not None:
         chosen &= ~closed(closed_form.while_open)
-    for contact in _departures(
-        closed_form
-    ):  # before the first one there is nothing to compare with
+    for contact in _departures(closed_form):
+        # before the first one there is nothing to compare with
         chosen &= left(contact)
     if (until := closed_form.until_departure) is not None:
         chosen &= np.logical_and.accumulate(closed(until) & ~left(until))
@@ -117,9 +116,8 @@ def landed(result: Trajectory) -> NDArray[np.bool_]:
         closed = np.asarray(result[names.name(names.CONTACT, contact)], dtype=bool)
         found[1:] |= closed[1:] & ~closed[:-1]
         count = names.name(names.DEPARTURES, contact)
-        if (
-            count in known
-        ):  # one that opens twice between two points, or while it was open, had closed
+        if count in known:
+            # one that opens twice between two points, or while it was open, had closed
             found[1:] |= np.diff(np.asarray(result[count], dtype=float)) > closed[:-1]
         if (impacts := names.name(names.CLOSINGS, contact)) in known:  # a bounce, too
             found |= np.asarray(result[impacts]) > 0

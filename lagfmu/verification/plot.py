@@ -205,9 +205,8 @@ def _mark_events(axis: Any, result: Trajectory, known: Sequence[str], figure: An
                 named.append((found[0], words.format(of)))
     if figure is None:
         return
-    wide = (
-        (end - start) * LETTER / (0.62 * figure.get_figwidth())
-    )  # s, of one letter; a legend has the rest
+    # s, of one letter; a legend has the rest
+    wide = (end - start) * LETTER / (0.62 * figure.get_figwidth())
     taken: list[float] = []  # where each row is free from
     for moment, text in sorted(named):
         width = wide * len(text)

@@ -26,11 +26,8 @@ from .statements import read_statements
 RECORD = "resources/lagfmu.json"
 MODES = ("Boolean", "Real")  # what a mode may be: a Real where an FMU has Reals alone
 NUMBERS = ("Real", "Integer")
-RECORDED = (
-    "local",
-    "input",
-    "calculatedParameter",
-)  # where a statement reads them, besides outputs
+# where a statement reads them, besides outputs
+RECORDED = ("local", "input", "calculatedParameter")
 OF_THE_FILE = 3  # checks that come before the statements on its physics
 
 

@@ -16,9 +16,8 @@ from ...numeric.system import System
 POINTS = 4
 APART = 0.3  # of the way that a motion went: what its rates may miss
 
-Past = tuple[
-    tuple[float, ...], ...
-]  # the latest communication points: t, then the value of each motion
+# the latest communication points: t, then the value of each motion
+Past = tuple[tuple[float, ...], ...]
 
 
 def estimated(

@@ -14,10 +14,8 @@ from .problem import Problem
 
 Floats = NDArray[np.float64]
 TIED = 0.95  # a correlation that is told
-EXPLAINED = (
-    0.01,
-    0.99,
-)  # parts of the chi-squared distribution between which residuals are as expected
+# parts of the chi-squared distribution between which residuals are as expected
+EXPLAINED = (0.01, 0.99)
 
 
 @dataclass(frozen=True)

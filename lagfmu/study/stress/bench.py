@@ -147,9 +147,8 @@ class Bench:
         with np.errstate(all="ignore"):
             for q in self.facts.coordinates:
                 place = np.abs(run.rows[q])
-                rounding = ROUNDING * abs(
-                    run.values.get(q, 0.0)
-                )  # of a start that was projected onto 0
+                # of a start that was projected onto 0
+                rounding = ROUNDING * abs(run.values.get(q, 0.0))
                 place = np.where(place > rounding, place, 0.0)
                 size = np.maximum(place, self.facts.same_unit(q, run.values))
                 size = np.where(size > 0, size, 1.0)

@@ -158,9 +158,8 @@ def _size(facts: Facts, run: Run, constraint: str) -> Column | None:
         return None
     size = np.zeros(len(rows))
     shares = {q: facts.share(constraint, q) for q in facts.coordinates}
-    if not any(
-        shares.values()
-    ):  # which name constraints of one word only: at least what has f's unit
+    if not any(shares.values()):
+        # which name constraints of one word only: at least what has f's unit
         residual = names.name(names.RESIDUAL, constraint)
         size = np.maximum(
             _largest_peer(facts, run, residual), facts.same_unit(residual, run.values)
