@@ -51,7 +51,7 @@ PAIRS = ((3e-5, 1e-5), (1e-3, 3e-4))  # of a number's size
 TOLERANCE, REFERENCE = 1e-11, 1e-13
 AGREED, KNOWN, TRUSTED, ROUNDED = 1e-6, 1e-4, 3.0, 1e-11
 POINTS, SPAN, COLUMNS = 9, 2.0, 3
-DEFAULT_COST = ("PendulumCartesian", "Hemisphere", "HalfCar", "Chain", "RoughHemisphere")
+DEFAULT_COST = ("PendulumCartesian", "Hemisphere", "HalfCar", "Chain", "RoughHemisphere", "Bowling")
 
 
 def differences(
