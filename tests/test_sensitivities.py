@@ -115,6 +115,42 @@ def test_reduced_coordinates_give_the_derivatives_of_all(varied):
     np.testing.assert_allclose(found["sensitivity.theta.by.R"], of_angle, atol=1e-11)
 
 
+def test_a_stiff_damper_by_the_implicit_method(built):
+    """m x'' + c x' + k x = 0 from rest, m = 1, c = 1e6, k = 1e4: with r = (-c +- sqrt(c^2 - 4 m k))/(2 m),
+    x = x0 (r2 e^(r1 t) - r1 e^(r2 t))/(r2 - r1), slow by r1 = -0.01/s and quick by r2 = -1e6/s. radau5 has
+    the derivatives in steps of the slow motion, and the run keeps the bits that it has without them."""
+    x = dynamicsymbols("x")
+    m, c, k, x0 = symbols("m c k x0", positive=True)
+    model = Model(
+        name="Damper",
+        lagrangian=m * x.diff() ** 2 / 2 - k * x**2 / 2,
+        forces={x: -c * x.diff()},
+        coordinates={x: "m"},
+        parameters=[
+            Parameter(m, 1.0, "kg"),
+            Parameter(c, 1e6, "N.s/m"),
+            Parameter(k, 1e4, "N/m"),
+            Parameter(x0, 0.5, "m"),
+        ],
+        start={x: x0},
+    )
+    plain = built(model, Scene("Damper", method="radau5", methods=("radau5",)))
+    asked = Scene(
+        "Damper", method="radau5", methods=("radau5",), sensitivities=("x,der(x):c,k,x0",)
+    )
+    both = [run(fmu, 100.0, 10, None, 1e-8) for fmu in (plain, built(model, asked))]
+    for output in both[0].dtype.names:
+        assert both[0][output].tobytes() == both[1][output].tobytes(), output
+    found = both[1]
+    assert found["solver.steps"][-1] < 200
+    slow = -2e4 / (1e6 + math.sqrt(1e12 - 4e4))
+    expected = 0.5 * np.exp(slow * found["time"])  # e^(r2 t) is 0, and r1/r2 1e-8
+    slower = {"c": -slow / 1e6, "k": slow / 1e4, "x0": 0.0}  # d r1, to 1e-8
+    for by, change in slower.items():
+        moved = expected * (change * found["time"] + (by == "x0") / 0.5)
+        np.testing.assert_allclose(found[f"sensitivity.x.by.{by}"], moved, rtol=1e-6, atol=1e-12)
+
+
 # ------------------------------------------------------------------------------- contacts
 
 
@@ -450,9 +486,11 @@ def test_a_number_that_is_fixed_has_no_derivative():
 
 
 def test_methods_whose_steps_are_not_differentiated():
-    """radau5 and rattle are refused by name; auto is dop853."""
-    with pytest.raises(RequestError, match="sensitivities with the method 'radau5'"):
-        Scene("Bad", method="radau5", sensitivities=("r:a",))
+    """rattle is refused by name; auto is dop853, and radau5 is there where it is asked for."""
+    with pytest.raises(RequestError, match="sensitivities with the method 'rattle'"):
+        Scene("Bad", method="rattle", sensitivities=("r:a",))
+    stiff = Scene("Stiff", method="radau5", sensitivities=("r:a",))
+    assert stiff.selectable == ("dop853", "rk4", "radau5")
     assert Scene("Good", sensitivities=("r:a",)).method == "dop853"
 
 

@@ -17,7 +17,8 @@ from .elements import NAME, is_number
 
 FORMULATIONS = ("multipliers", "nullspace", "minimal")
 EVERYTHING = ("*",)
-VARIED = ("dop853", "rk4")  # methods whose steps are differentiated
+EXPLICIT = ("dop853", "rk4")  # methods whose steps are differentiated, and with them ...
+VARIED = (*EXPLICIT, "radau5")  # ... what has to be asked for
 
 
 @dataclass(frozen=True)
@@ -169,7 +170,7 @@ class Scene:
         if self.methods is not None:
             return tuple(self.methods)
         if self.sensitivities:
-            return VARIED if self.complete else (self.method,)
+            return tuple(m for m in VARIED if m == self.method or (self.complete and m in EXPLICIT))
         return METHODS if self.complete else (self.method,)
 
     @property

@@ -15,7 +15,8 @@ typedef struct {
     void *context;
     /* f(t, y); FAILED where it cannot be evaluated: the step is cut there, the cause is in `why` */
     Status (*rate)(void *context, double t, const double *y, double *dydt);
-    /* J = df/dy, dense, row by row (ny * ny), and df/dt (ny); for radau5 */
+    /* J = df/dy of the components that are watched (n), dense, row by row (n * n), and df/dt (n); for radau5.  The
+     * others, if there are any, are blocks of n with x' = J x + ... of their own. */
     Status (*jacobian)(void *context, double t, const double *y, double *J, double *dfdt);
     Why *why;
 } Ode;
@@ -51,7 +52,7 @@ struct Method {
     const char *name;
     int dense_arrays;                 /* arrays of ny doubles in `dense` */
     int scratch_arrays;               /* arrays of ny doubles in `scratch`, */
-    int scratch_matrices;             /* and of ny^2, with ny pivots each, where there are RADAU5_MOST_STATES at most */
+    int scratch_matrices;             /* and of watched^2, with as many pivots each, of RADAU5_MOST_STATES at most */
     int last_stage; /* arrays in `dense` before two of a stage at t, its argument and its rate, which
                      * stay as they are; 0: they are not kept */
     int fixed;                        /* a fixed step that divides the way to t_bound evenly */

@@ -12,7 +12,11 @@
  * Error: err = (g/h - J)^-1 (f(t, y) - p'(0)/h), p the collocation polynomial (eqs. IV.8.19,
  * IV.8.20), an estimate of order 3: err < 0.1 tol^(2/3) keeps that of the method near tol (Hairer's
  * radau5). Step sizes: Gustafsson's predictive controller (eq. IV.8.25).  Dense output: p, of order
- * 3. J is evaluated at each step, so that nothing but the last polynomial is remembered. */
+ * 3. J is evaluated at each step, so that nothing but the last polynomial is remembered.
+ *
+ * Blocks behind the state (columns of derivatives, S' = J S + ...) are solved for with the state's factors, in its
+ * iterations and, where these are too few for them, in further ones that leave the state as it is: a step of S is
+ * the derivative of the step of y, and that is what it is without them. */
 #include "lu.h"
 #include "step_size.h"
 
@@ -38,19 +42,20 @@ static const double P[3][3] = {
 static const double RADAU_SAFETY = 0.9, RADAU_LEAST_FACTOR = 1.0 / 5, RADAU_LARGEST_FACTOR = 8;
 static const double LEAST_ERROR = 1e-2; /* that the predictive controller remembers */
 enum {
-    NEWTON_ITERATIONS = 7 /* of Newton's method, at most */
+    NEWTON_ITERATIONS = 7, /* of Newton's method, at most */
+    BLOCK_ITERATIONS = 50  /* the same of blocks behind the state, which are linear */
 };
 
 /* Where things lie in the scratch. */
 typedef struct {
-    double *J, *real, *re, *im;    /* (n * n); the LU factors */
-    double *z, *w, *r;             /* (3 n) */
-    double *y, *weight, *error, *defect; /* (n) */
+    double *J, *real, *re, *im;    /* (n * n) of the state; the LU factors */
+    double *z, *w, *r;             /* (3 ny) */
+    double *y, *weight, *error, *defect; /* (ny) */
     int *pivots, *pivots_complex;
 } Work;
 
 static Work work_of(const Integrator *i) {
-    const int n = i->ny, square = n * n;
+    const int n = i->ny, square = i->watched * i->watched;
     Work x;
     x.J = i->scratch;
     x.real = x.J + square;
@@ -64,7 +69,7 @@ static Work work_of(const Integrator *i) {
     x.error = x.weight + n;
     x.defect = x.error + n;
     x.pivots = i->pivots;
-    x.pivots_complex = i->pivots + n;
+    x.pivots_complex = i->pivots + i->watched;
     return x;
 }
 
@@ -128,29 +133,70 @@ static Status stage_residual(const Integrator *i, const Ode *ode, Work x, const 
     return OK;
 }
 
-static double weighted_mean(int n, int blocks, const double *x, const double *weight) {
+/* Of n numbers in each of `stages` that are `apart`. */
+static double weighted_mean(int n, int stages, int apart, const double *x, const double *weight) {
     double sum = 0;
-    for (int k = 0; k < blocks; k++)
+    for (int k = 0; k < stages; k++)
         for (int j = 0; j < n; j++) {
-            double ratio = x[k * n + j] / weight[j];
+            double ratio = x[k * apart + j] / weight[j];
             sum += ratio * ratio;
         }
-    return sqrt(sum / (blocks * n));
+    return sqrt(sum / (stages * n));
+}
+
+/* Newton's correction of the blocks from `first` on, in x.r. */
+static void correct_blocks(const Integrator *i, Work x, int first) {
+    const int n = i->watched, all = i->ny;
+    for (int from = first * n; from < all; from += n) {
+        lu_solve(n, x.real, x.pivots, x.r + from);
+        lu_solve_complex(n, x.re, x.im, x.pivots_complex, x.r + all + from, x.r + 2 * all + from);
+    }
+}
+
+/* The largest correction of a block, in parts of the tolerance of its own size: that of its largest component. */
+static double left_of_blocks(const Integrator *i, Work x, double tolerance) {
+    const int n = i->watched;
+    double most = 0;
+    for (int from = n; from < i->ny; from += n) {
+        double size = 0;
+        for (int j = 0; j < n; j++)
+            size = fmax(size, fabs(i->y[from + j] + x.z[2 * i->ny + from + j]) / x.weight[j] * tolerance);
+        if (size > 0) most = fmax(most, weighted_mean(n, 3, i->ny, x.r + from, x.weight) / size);
+    }
+    return most;
+}
+
+/* The blocks for stages of the state that stay; what does not settle is no number. */
+static void settle_blocks(const Integrator *i, const Ode *ode, Work x, const Trial *trial, double enough,
+                          double tolerance) {
+    const int n = i->watched, all = i->ny;
+    double left = left_of_blocks(i, x, tolerance);
+    for (int count = 0; left > enough && count < BLOCK_ITERATIONS; count++) {
+        if (stage_residual(i, ode, x, trial) != OK) break;
+        correct_blocks(i, x, 1);
+        for (int k = 0; k < 3; k++)
+            for (int j = n; j < all; j++) x.w[k * all + j] += x.r[k * all + j];
+        for (int j = n; j < all; j++)
+            for (int k = 0; k < 3; k++)
+                x.z[k * all + j] = T[k][0] * x.w[j] + T[k][1] * x.w[all + j] + T[k][2] * x.w[2 * all + j];
+        left = left_of_blocks(i, x, tolerance);
+    }
+    for (int j = n; j < all && left > enough; j++) x.z[2 * all + j] = NAN;
 }
 
 /* Solves for Z to a part `enough` of the tolerance.  The iterations that it took; 0: it diverges,
  * is too slow, or a stage cannot be evaluated. */
-static int newton_on_stages(const Integrator *i, const Ode *ode, Work x, Trial *trial, double enough) {
-    const int n = i->ny;
+static int newton_on_stages(const Integrator *i, const Ode *ode, Work x, Trial *trial, double enough,
+                            double tolerance) {
+    const int n = i->watched, all = i->ny;
     double before = 0, theta = 0, eta = 1;
     for (int count = 1; count <= NEWTON_ITERATIONS; count++) {
         if (stage_residual(i, ode, x, trial) != OK) {
             trial->unevaluated = 1;
             return 0;
         }
-        lu_solve(n, x.real, x.pivots, x.r);
-        lu_solve_complex(n, x.re, x.im, x.pivots_complex, x.r + n, x.r + 2 * n);
-        double size = weighted_mean(n, 3, x.r, x.weight);
+        correct_blocks(i, x, 0);
+        double size = weighted_mean(n, 3, all, x.r, x.weight);
         if (!isfinite(size)) return 0;
         if (count > 1) {
             double ratio = size / before;
@@ -161,9 +207,12 @@ static int newton_on_stages(const Integrator *i, const Ode *ode, Work x, Trial *
             for (int k = count; k < NEWTON_ITERATIONS; k++) last *= theta;
             if (last > enough) return 0;
         }
-        for (int j = 0; j < 3 * n; j++) x.w[j] += x.r[j];
-        combine(n, T, x.w, x.z);
-        if (eta * size <= enough) return count;
+        for (int j = 0; j < 3 * all; j++) x.w[j] += x.r[j];
+        combine(all, T, x.w, x.z);
+        if (eta * size <= enough) {
+            if (all > n) settle_blocks(i, ode, x, trial, enough, tolerance);
+            return count;
+        }
         before = size;
     }
     return 0;
@@ -173,22 +222,22 @@ static int newton_on_stages(const Integrator *i, const Ode *ode, Work x, Trial *
  * that damps what is infinitely stiff (eq. IV.8.20). */
 static double implicit_error_norm(const Integrator *i, const Ode *ode, Work x, double h, double tolerance,
                                   const double *scale, int twice) {
-    const int n = i->ny;
+    const int n = i->watched, all = i->ny;
     for (int j = 0; j < n; j++) {
-        double end = i->y[j] + x.z[2 * n + j];
+        double end = i->y[j] + x.z[2 * all + j];
         x.weight[j] = step_size_weight(tolerance, i->y[j], end, scale[j]) + 0 * end;
         x.defect[j] =
-            -(P[0][0] * x.z[j] + P[0][1] * x.z[n + j] + P[0][2] * x.z[2 * n + j]) / h;
+            -(P[0][0] * x.z[j] + P[0][1] * x.z[all + j] + P[0][2] * x.z[2 * all + j]) / h;
         x.error[j] = i->f[j] + x.defect[j];
     }
     lu_solve(n, x.real, x.pivots, x.error);
-    double size = weighted_mean(n, 1, x.error, x.weight);
+    double size = weighted_mean(n, 1, all, x.error, x.weight);
     if (!twice || !(size >= 1)) return size;
-    for (int j = 0; j < n; j++) x.y[j] = i->y[j] + x.error[j];
+    for (int j = 0; j < all; j++) x.y[j] = j < n ? i->y[j] + x.error[j] : i->y[j];
     if (ode->rate(ode->context, i->t, x.y, x.error) != OK) return size;
     for (int j = 0; j < n; j++) x.error[j] += x.defect[j];
     lu_solve(n, x.real, x.pivots, x.error);
-    return weighted_mean(n, 1, x.error, x.weight);
+    return weighted_mean(n, 1, all, x.error, x.weight);
 }
 
 static double limit(double factor) {
@@ -224,7 +273,7 @@ static void accept_trial(Integrator *i, const Trial *trial, Work x, double error
 }
 
 static Status radau5_step(Integrator *i, const Ode *ode, const Control *control, double t_bound) {
-    const int n = i->ny;
+    const int n = i->watched;
     if (n > RADAU5_MOST_STATES)
         return fail(ode->why,
                     "radau5 keeps dense matrices, of %d states at most; this model has %d: choose "
@@ -243,7 +292,7 @@ static Status radau5_step(Integrator *i, const Ode *ode, const Control *control,
         predict(i, x, trial.h);
         for (int j = 0; j < n; j++)
             x.weight[j] = step_size_weight(tolerance, i->y[j], i->y[j], control->scale[j]);
-        if (factor_matrices(n, x, trial.h)) count = newton_on_stages(i, ode, x, &trial, enough);
+        if (factor_matrices(n, x, trial.h)) count = newton_on_stages(i, ode, x, &trial, enough, tolerance);
         if (count > 0) {
             int first = trial.rejected > 0 || !(i->error_old > 0);
             double error =
