@@ -156,6 +156,19 @@ def test_a_small_error_of_what_follows_from_other_outputs_is_found(lawful, name,
                 assert column in judged(one, change), (column, value)
 
 
+def test_eulers_equations_are_held_against_what_turns_in_space(lawful):
+    """J w' + w x J w = M of a gyroscope: an angular acceleration off by 1e-9 of itself is found."""
+    with Bench(lawful("Gyroscope"), quick=True) as one:
+        assert judged(one, lambda rows: None) == []
+        for x in "xy":
+
+            def change(rows, x=x):
+                row = int(np.argmax(np.abs(rows[f"der(wheel.omega.{x})"])))
+                rows[f"der(wheel.omega.{x})"][row] *= 1 + 1e-9
+
+            assert f"Lagrange's equation of wheel.omega.{x}" in judged(one, change)
+
+
 def test_a_surface_that_pulls_is_found(bench):
     """lambda < 0 while closed; lambda != 0 in flight; r < a in flight; r = a + 1e-12 while closed."""
     closed = bench.ordinary.rows["contact.surface"]

@@ -72,7 +72,7 @@ def attitudes(model: Model, table: Mapping[Expr, Expr]) -> Closed:
         fixed.setdefault(a.quaternion, {})[a] = None
     made = Closed()
     for k, four in enumerate(quaternions(model)):
-        w = _angular_velocity(model, four) if four in of_quaternions else None
+        w = angular_velocity(model, four) if four in of_quaternions else None
         if w is not None:
             e, w = tuple(table[s] for s in four), tuple(s.xreplace(table) for s in w)
             made.matrix(k, e, w)
@@ -82,7 +82,7 @@ def attitudes(model: Model, table: Mapping[Expr, Expr]) -> Closed:
     return made
 
 
-def _angular_velocity(model: Model, four: tuple[Expr, ...]) -> tuple[Expr, ...] | None:
+def angular_velocity(model: Model, four: tuple[Expr, ...]) -> tuple[Expr, ...] | None:
     """w (3) in the frame of the body; None if the kinematics are others."""
     if not all(s in model.kinematics for s in four):
         return None

@@ -145,10 +145,11 @@ def judged(closed_forms: tuple[CarriedForm, ...], inputs: set[str]) -> tuple[Jud
 def laws(closed_forms: tuple[CarriedForm, ...]) -> tuple[JudgedForm, ...]:
     """Lagrange's equations (lagrange.py), compiled: instantaneous even where time stands in them.
 
-    One value that has to vanish, or that projection makes vanish, is rounding of the run, not of itself.
+    One value that has to vanish, or that projection makes vanish, is rounding of the run, not of itself, and so
+    is the margin of a joint that carries nothing.
     """
     alone = [
-        names.read(c.name).quantity == names.RESIDUAL
+        names.read(c.name).quantity in (names.RESIDUAL, names.MARGIN)
         or (c.expected == 0 and sp.sympify(c.actual).is_Symbol)
         for c in closed_forms
     ]

@@ -29,6 +29,7 @@ from .player import Run
 
 EPS = float(np.finfo(float).eps)
 ROUNDING = 200 * EPS  # of a residual, relative to its own size
+NOTHING = EPS**2 / ROUNDING  # of the usual place: the square of its rounding is nothing
 GAP = 4e-9  # of f's own size: nearer than a quarter of that a contact touches
 Column = NDArray[np.float64]
 
@@ -103,7 +104,7 @@ def wound(facts: Facts, run: Run) -> Column:
 
 
 def magnitudes(facts: Facts, run: Run) -> dict[str, float]:
-    """The magnitude that an error is relative to, at the least: of coordinates, velocities, energy.
+    """The magnitude that an error is relative to, at the least: of coordinates, velocities, forces, energy.
 
     A coordinate is known to the rounding of the value that it was given at the start, however small the
     one is onto which that was projected; a velocity to what would move the coordinate by its rounding within
@@ -113,7 +114,7 @@ def magnitudes(facts: Facts, run: Run) -> dict[str, float]:
     found = {}
     work, span = 0.0, float(run.rows["time"][-1] - run.rows["time"][0])
     for q in facts.coordinates:
-        rounding = EPS * abs(run.values.get(q, 0.0))
+        rounding = max(EPS * abs(run.values.get(q, 0.0)), NOTHING * facts.usual(q))
         found[q] = max(facts.same_unit(q, run.values), rounding)
         peers = [p for p in facts.coordinates if facts.dimensions[p] == facts.dimensions[q]]
         fastest = max(float(np.abs(run.rows[names.derivative(p)]).max()) for p in peers)
@@ -122,6 +123,14 @@ def magnitudes(facts: Facts, run: Run) -> dict[str, float]:
         found[names.derivative(q)] = max(fastest, creep)
         if names.name(names.FORCE, "", q) in facts.variables:
             work += EPS * size * float(np.abs(run.rows[names.name(names.FORCE, "", q)]).max())
+    own = [s.name for s in facts.starts if names.read(s.name).order == 0]
+    for speed in set(own) - set(facts.coordinates):
+        alike = [p for p in own if facts.alike(p, speed)]
+        found[speed] = max(float(np.abs(run.rows[p]).max()) for p in alike)
+    pushes = [names.name(names.MULTIPLIER, c) for c in facts.constraints]
+    for push in pushes:  # they are solved for together
+        alike = [p for p in pushes if facts.alike(p, push)]
+        found[push] = EPS / ROUNDING * max(float(np.abs(run.rows[p]).max()) for p in alike)
     if names.POTENTIAL in facts.variables:
         parts = np.abs(run.rows[names.KINETIC]) + np.abs(run.rows[names.POTENTIAL])
         found[names.TOTAL] = found[names.DISSIPATED] = max(float(parts.max()), work)
@@ -161,9 +170,8 @@ def _size(facts: Facts, run: Run, constraint: str) -> Column | None:
     if not any(shares.values()):
         # which name constraints of one word only: at least what has f's unit
         residual = names.name(names.RESIDUAL, constraint)
-        size = np.maximum(
-            _largest_peer(facts, run, residual), facts.same_unit(residual, run.values)
-        )
+        least = max(facts.same_unit(residual, run.values), NOTHING * facts.usual(residual))
+        size = np.maximum(_largest_peer(facts, run, residual), least)
     for q, share in shares.items():
         if share is None:
             continue
@@ -175,8 +183,8 @@ def _size(facts: Facts, run: Run, constraint: str) -> Column | None:
         peers = _largest_peer(facts, run, name)
         if facts.rates(constraint):  # they are found together, beside the fastest of them
             column = peers
-        else:  # the square of a rounding of the usual place is nothing
-            least = max(least, EPS**2 / ROUNDING * max(facts.usual(q), float(peers[-1])))
+        else:
+            least = max(least, NOTHING * max(facts.usual(q), float(peers[-1])))
         G = np.abs(rows[share] / np.where(acting, lam, 1.0))
         size += np.where(acting, G, G[acting].max()) * np.maximum(
             np.maximum.accumulate(np.abs(column)), least

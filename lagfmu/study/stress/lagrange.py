@@ -1,6 +1,8 @@
 """Lagrange's equations as statements about what an FMU reports, straight from the model.
 
-    d/dt dL/dv_j - dL/dq_j = Q_nc,j + Q_j                  for each coordinate
+    d/dt dL/dv_j - dL/dq_j = Q_nc,j + Q_j                  for each coordinate that is not moved by kinematics
+    d/dt dL/dw + w x dL/dw - X L = Q_nc + Q                for each angular velocity w in the frame of a body,
+                                                           X the derivative along w (mechanics/kinematics.py)
     d^2 f/dt^2 = 0   or   d/dt (sum a_j v_j + a_0) = 0     for each constraint, while it acts
     Q_cj = lambda_c a_cj ,   residual_c = f   or   sum a_j v_j + a_0
     friction: |lambda| <= mu_s |N| while it sticks, lambda = -mu_k |N| s/|s| while it slips, lambda . s <= 0;
@@ -17,7 +19,8 @@ where the terms of Q_j are its shares.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -26,9 +29,12 @@ from sympy.core.relational import Relational
 
 from ... import names
 from ...fmu.closed_forms import pack_closed_forms
+from ...mechanics.attitudes import angular_velocity
+from ...model.attitude import across, written_out
 from ...model.closed_form import TIME, ClosedForm, in_variables, output
 from ...model.elements import Constraint, Expr
 from ...model.model import Contact, Friction, Model, Nonholonomic, name_of
+from ...model.speeds import quaternions
 from ...prepare.prepare import Prepared
 from .closed_forms import EQUATION, SLOW, magnitude
 from .facts import beside
@@ -63,7 +69,15 @@ def lagrange(model: Model, variables: frozenset[str]) -> list[ClosedForm]:
         forms += _of_friction(model, law)
     for o in model.outputs:
         forms.append(ClosedForm(o.name, o.expression, rounding=ROUNDING))
-    return [form for form in forms if _names(form) <= variables]
+    return [form for form in map(_written_out, forms) if _names(form) <= variables]
+
+
+def _written_out(form: ClosedForm) -> ClosedForm:
+    """With polynomials for rotation matrices."""
+    parts = {name: getattr(form, name) for name in ("expected", "actual", "scale", "when")}
+    return replace(
+        form, **{k: written_out(sp.sympify(e)) for k, e in parts.items() if e is not None}
+    )
 
 
 def _beside_jumps(model: Model) -> Expr | None:
@@ -78,14 +92,26 @@ def _beside_jumps(model: Model) -> Expr | None:
 
 
 def _sides(model: Model, variables: frozenset[str]) -> tuple[Any, Any, Any]:
-    """Of each coordinate: the two sides of Lagrange's equation, M_qq, and the magnitude of all terms."""
-    L, sides, masses = model.energy_expression, {}, {}
+    """Of each coordinate or angular velocity: the two sides of its equation, the mass, and the magnitude of
+    all terms."""
+    L, left, masses = written_out(model.energy_expression), {}, {}
     for q in model.coordinates:
-        v, name = q.diff(TIME), names.name(names.FORCE, "", name_of(q))
-        force = sp.sympify(model.forces.get(q, 0)) + (output(name) if name in variables else 0)
-        sides[q] = (L.diff(v).diff(TIME) - L.diff(q), force)
-        masses[q] = sp.Abs(in_variables(L.diff(v, 2)))
-    shares = _shares(model, variables)
+        if q not in model.kinematics:
+            left[q] = L.diff(q.diff(TIME)).diff(TIME) - L.diff(q)
+            masses[q] = sp.Abs(in_variables(L.diff(q.diff(TIME), 2)))
+    rates = {q: written_out(sp.sympify(rate)) for q, rate in model.kinematics.items()}
+    for four in quaternions(model):
+        turning = angular_velocity(model, four) or ()
+        momentum = [L.diff(w) for w in turning]
+        for w, spin, bend in zip(turning, momentum, across(turning, momentum), strict=True):
+            along = sp.Add(*(L.diff(q) * rate.diff(w) for q, rate in rates.items()))
+            left[w] = spin.diff(TIME) + bend - along
+            masses[w] = sp.Abs(in_variables(L.diff(w, 2)))
+    shares, sides = _shares(left, model, variables), {}
+    for q, side in left.items():
+        name = names.name(names.FORCE, "", name_of(q))
+        force = written_out(sp.sympify(model.forces.get(q, 0)))
+        sides[q] = (side, force + (output(name) if name in variables else 0))
     terms = {q: sum(map(magnitude, map(in_variables, sides[q])), shares[q]) for q in sides}
     return sides, masses, terms
 
@@ -97,12 +123,12 @@ def _alone(masses: Mapping[Expr, Expr], terms: Mapping[Expr, Expr]) -> dict[Expr
     return {q: total / sp.sqrt(masses[q]) for q in heavy}
 
 
-def _shares(model: Model, variables: frozenset[str]) -> dict[Expr, Expr]:
+def _shares(of: Iterable[Expr], model: Model, variables: frozenset[str]) -> dict[Expr, Expr]:
     """The magnitudes of what constraints contribute to Q, whose sum may be far smaller."""
     found = {}
-    for q in model.coordinates:
-        of = [names.name(names.FORCE, c.name, name_of(q)) for c in model.constraints]
-        found[q] = sp.Add(*(sp.Abs(output(n)) for n in of if n in variables))
+    for q in of:
+        known = [names.name(names.FORCE, c.name, name_of(q)) for c in model.constraints]
+        found[q] = sp.Add(*(sp.Abs(output(n)) for n in known if n in variables))
     return found
 
 
@@ -170,9 +196,12 @@ def _along(constraint: Constraint, q: Expr) -> Expr:
 
 
 def _of_constraints(model: Model, accelerations: dict[Expr, Expr]) -> list[ClosedForm]:
+    """Without those in attitudes, of which formulas of two derivatives would take a page each."""
     found = []
     for c in model.constraints:
         rate, along = sp.sympify(c.expression), accelerations
+        if rate.has(*model.kinematics, *model.speeds):
+            continue
         if isinstance(c, Nonholonomic):
             along = {q.diff(TIME): a for q, a in accelerations.items()}
         scale = sp.Add(*(sp.Abs(in_variables(rate.diff(x))) * a for x, a in along.items()))
