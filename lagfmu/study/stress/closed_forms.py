@@ -145,7 +145,7 @@ def judged(closed_forms: tuple[CarriedForm, ...], inputs: set[str]) -> tuple[Jud
 def laws(closed_forms: tuple[CarriedForm, ...]) -> tuple[JudgedForm, ...]:
     """Lagrange's equations (lagrange.py), compiled: instantaneous even where time stands in them.
 
-    One value that has to vanish, or that projection makes vanish, is rounding of the run, not of itself, and so
+    One value that has to vanish, or that projection makes vanish, is rounding of the run, not of itself; so
     is the margin of a joint that carries nothing.
     """
     alone = [

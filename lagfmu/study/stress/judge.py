@@ -123,10 +123,10 @@ def magnitudes(facts: Facts, run: Run) -> dict[str, float]:
         found[names.derivative(q)] = max(fastest, creep)
         if names.name(names.FORCE, "", q) in facts.variables:
             work += EPS * size * float(np.abs(run.rows[names.name(names.FORCE, "", q)]).max())
-    own = [s.name for s in facts.starts if names.read(s.name).order == 0]
-    for speed in set(own) - set(facts.coordinates):
-        alike = [p for p in own if facts.alike(p, speed)]
-        found[speed] = max(float(np.abs(run.rows[p]).max()) for p in alike)
+    moved = [n for n in facts.dimensions if names.derivative(n) in facts.dimensions]
+    for own in set(moved) - set(facts.coordinates) - set(facts.motions):  # speeds, quaternions
+        alike = [n for n in moved if facts.alike(n, own) and n in (run.rows.dtype.names or ())]
+        found[own] = max((float(np.abs(run.rows[n]).max()) for n in alike), default=0.0)
     pushes = [names.name(names.MULTIPLIER, c) for c in facts.constraints]
     for push in pushes:  # they are solved for together
         alike = [p for p in pushes if facts.alike(p, push)]
