@@ -30,11 +30,12 @@ from sympy.core.relational import Relational
 from ... import names
 from ...fmu.closed_forms import pack_closed_forms
 from ...mechanics.attitudes import angular_velocity
-from ...model.attitude import across, written_out
+from ...model.attitude import written_out
 from ...model.closed_form import TIME, ClosedForm, in_variables, output
 from ...model.elements import Constraint, Expr
 from ...model.model import Contact, Friction, Model, Nonholonomic, name_of
 from ...model.speeds import quaternions
+from ...numeric.closed import across
 from ...prepare.prepare import Prepared
 from .closed_forms import EQUATION, SLOW, magnitude
 from .facts import beside
