@@ -13,7 +13,7 @@ from sympy import Piecewise, sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Model, Output, Parameter, Scene
-from lagfmu.bodies import Body, Gravity, Ground, Revolute, SpringDamper, mechanism
+from lagfmu.bodies import Body, Gravity, Ground, Revolute, SpringDamper, Torsion, mechanism
 from lagfmu.testing import find_compiler, load
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
@@ -159,3 +159,40 @@ def test_what_has_no_derivative_has_no_adjoint(library3):
     assert "'m'" in one.refuses("GetAdjointDerivative", *asks(one, "lambda.rod", "m"))
     asked = asks(one, "lambda.rod", "x", math.nan)
     assert "seed of 'lambda.rod' is nan" in one.refuses("GetAdjointDerivative", *asked)
+
+
+def test_derivatives_by_an_angle_that_counts_turns(library3, built):
+    """A pendulum on a torsion spring, two turns on: its states are settled where they are set, so that by
+    angle.A nothing changes, and by the attitude all that hangs on the angle; as differences say."""
+    pendulum, ground = Body("pendulum", mass=1.0, inertia=(0.02, 0.03, 0.05)), Ground()
+    model = mechanism(
+        "WoundUp",
+        bodies=[pendulum],
+        joints=[Revolute("A", ground.at((0, 0, 0)), pendulum.at((0.2, 0.1, 0)), axis="z")],
+        loads=[Gravity((0, -9.81, 1.0)), Torsion("S", "A", stiffness=3.0, angle=0.1)],
+        start={"angle.A": 4 * math.pi + 0.7, "der(angle.A)": 1.0},
+    )
+    one = library3(built(model, fmi=3))(exchange=True).start()
+    one.does("EnterContinuousTimeMode")
+    states = [d.variable.derivative.name for d in one.library.description.derivatives]
+    x, size = np.array(one.array("GetContinuousStates", len(states))), c_size_t(len(states))
+    unknowns = ["angle.A", "torque.S", "energy.potential"]
+    told = {u.variable.name: u.dependencies for u in one.library.description.outputs}
+    assert "pendulum.orientation.z" in {v.name for v in told["torque.S"]}
+
+    def values(y: np.ndarray) -> np.ndarray:
+        one.does("SetContinuousStates", (c_double * len(y))(*y), size)
+        return np.array(one.floats(unknowns))
+
+    for k, name in enumerate(states):
+        step = np.zeros(len(x))
+        step[k] = 1e-6
+        slopes = (values(x + step) - values(x - step)) / 2e-6
+        values(x)
+        found = one.derive("GetDirectionalDerivative", unknowns, [name], [1.0])
+        np.testing.assert_allclose(found, slopes, atol=1e-7)
+        if name == "angle.A":
+            assert not any(found)
+    assert "angle.A" in states
+    directional, adjoint = jacobians(one)
+    np.testing.assert_allclose(adjoint, directional, rtol=1e-11, atol=1e-12)

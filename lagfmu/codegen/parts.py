@@ -302,8 +302,13 @@ class Parts:
             )
         if eom.unwrapped:
             angles = values([*eom.unwrapped.values()], [eom.q[j] for j in eom.unwrapped])
-            text = "What angles equal modulo 2 pi."
-            yield Function("unwrapped_angles", text, still, {"angle": angles})
+            text, told = "What angles equal modulo 2 pi.", {"angle": angles}
+            yield Function("unwrapped_angles", text, still, told)
+            if self.tangents:
+                text = "Their change along the direction (dt, dq, du, dp)."
+                yield from self._derived(
+                    "unwrapped_tangent", "unwrapped_adjoint", text, still, told
+                )
 
     def _of_contacts(self) -> Iterator[Function]:
         """Restitution and Coulomb's law."""

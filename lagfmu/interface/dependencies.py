@@ -129,7 +129,9 @@ class Dependencies:
         """Inputs, states and the time behind a value at a communication point."""
         asked = frozenset(symbols)
         if asked not in self._sorted_at_points:
-            known = {n for n in asked if n in self.known or n == names.TIME}
+            angles = {str(self.stepped.q[j]): e for j, e in self.stepped.unwrapped.items()}
+            settled = self.symbols(*(e for name, e in angles.items() if name in asked))
+            known = {n for n in asked | settled if n in self.known or n == names.TIME}
             self._sorted_at_points[asked] = self._sorted(known)
         return self._sorted_at_points[asked]
 

@@ -211,8 +211,9 @@ class Tables:
             text += self._integers("unwrapped", [*self.eom.unwrapped])
             fields |= {name: p + name for name in ("unwrapped", "unwrapped_angles")}
             fields["unwrapped_count"] = len(self.eom.unwrapped)
-        if "kinematics_tangent" in functions:
-            fields["kinematics_tangent"] = f"{p}kinematics_tangent"
+        for name in ("kinematics_tangent", "unwrapped_tangent"):
+            if name in functions:
+                fields[name] = p + name
         return text, fields
 
     def _layout(self) -> tuple[str, dict[str, Any]]:

@@ -99,10 +99,12 @@ struct System {
     void (*kinematics_tangent)(double t, const double *q, const double *u, const double *p, double dt,
                                const double *dq, const double *du, const double *dp, double *dB, double *db);
     /* Unit quaternions: four places in q each, of e0 to e3.  Angles that equal `angle` (unwrapped_count) modulo
-     * 2 pi: their places in q.  0 and NULL without. */
+     * 2 pi: their places in q, and its change along a direction.  0 and NULL without. */
     int quaternions, unwrapped_count;
     const int *quaternion, *unwrapped;
     void (*unwrapped_angles)(double t, const double *q, const double *u, const double *p, double *angle);
+    void (*unwrapped_tangent)(double t, const double *q, const double *u, const double *p, double dt, const double *dq,
+                              const double *du, const double *dp, double *dangle);
     /* f (m), 0 for a nonholonomic row */
     void (*residual)(double t, const double *q, const double *u, const double *p, double *f);
     /* h (switches): the surfaces at which forces jump; NULL where there are none */

@@ -5,6 +5,7 @@
 #include "algebraic.h"
 #include "component.h"
 #include "digits.h"
+#include "segment.h"
 
 /* Where a known variable's change stands; NULL if it is neither time nor a state nor an input, nor a multiplier
  * that is given. */
@@ -41,9 +42,13 @@ double *component_known(Component *c, const Call *call, const Group *group, unsi
     return NULL;
 }
 
-/* Quaternions that are set are normalized: of a direction there is what is left of it then. */
-static void settle_direction(Instance *x) {
-    mechanism_settle_change(&x->solver.stepped, x->solver.state.q, x->solver.sensitivity.dq);
+/* States that are set are settled: of a direction there is what is left of it then. */
+static void settle_direction(Instance *x, double dt) {
+    Solver *s = &x->solver;
+    const Sensitivity *w = &s->sensitivity;
+    if (s->system->kinematics == NULL || s->system->kinematics_tangent == NULL) return;
+    const Instant at = segment_instant(s, s->state.now.t);
+    KINEMATICS->settle_along(&s->stepped, at.t, s->state.q, at.u, at.p, dt, w->dq, w->du, w->dp);
 }
 
 int component_has_derivatives(const Variable *v) {
@@ -74,7 +79,7 @@ int component_directional(Component *c, const Call *call, const Group *group, co
         *change += seed[k];
     }
     if (instance_observe(&c->instance) != OK) return component_no_value(c);
-    settle_direction(&c->instance);
+    settle_direction(&c->instance, d.dt);
     if (instance_differentiate(&c->instance, d) != OK) return component_no_value(c);
     for (size_t k = 0; k < unknown_count; k++) {
         const Variable *v = component_find(c, call, unknowns[k], group);

@@ -83,7 +83,7 @@ static Status find_gradient(Instance *x, const fmi3ValueReference unknowns[], co
     if (adjoint_back(stepped, &s->stepped, s->system, MODEL_ADJOINT, at, full != NULL ? NULL : &x->seen, q, v, dt,
                      stepped->du) != OK)
         return FAILED;
-    mechanism_settle_change(&s->stepped, q, stepped->dq);
+    adjoint_settle(stepped, &s->stepped, MODEL_ADJOINT, at, q, dt);
     return OK;
 }
 

@@ -121,6 +121,15 @@ static void kinematics_settle_change(const Mechanism *b, const double *q, double
     }
 }
 
+static void kinematics_settle_along(const Mechanism *b, double t, const double *q, const double *u, const double *p,
+                                    double dt, double *dq, const double *du, const double *dp) {
+    const System *s = b->system;
+    kinematics_settle_change(b, q, dq);
+    if (s->unwrapped_count == 0) return;
+    s->unwrapped_tangent(t, q, u, p, dt, dq, du, dp, b->angle);
+    for (int i = 0; i < s->unwrapped_count; i++) dq[s->unwrapped[i]] = b->angle[i];
+}
+
 static void kinematics_change(const Mechanism *b, double t, const double *q, const double *v, const double *u,
                    const double *p, double dt, const double *dq, const double *dv, const double *du,
                    const double *dp, double *dB, double *changed) {
@@ -130,6 +139,7 @@ static void kinematics_change(const Mechanism *b, double t, const double *q, con
     for (int e = 0; e < s->rates; e++) changed[s->rate_row[e]] += dB[e] * v[s->rate_column[e]];
 }
 
-static const Kinematics OF_SPEEDS = {kinematics_layout, kinematics_evaluate, kinematics_rates,         kinematics_move,
-                                     kinematics_reach,  kinematics_settle,   kinematics_settle_change, kinematics_change};
+static const Kinematics OF_SPEEDS = {
+    kinematics_layout, kinematics_evaluate,      kinematics_rates,        kinematics_move,  kinematics_reach,
+    kinematics_settle, kinematics_settle_change, kinematics_settle_along, kinematics_change};
 SHARED_VALUE const Kinematics *const KINEMATICS = &OF_SPEEDS;

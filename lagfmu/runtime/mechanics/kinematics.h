@@ -25,6 +25,9 @@ typedef struct {
     Status (*settle)(const struct Mechanism *b, double t, double *q, const double *u, const double *p);
     /* Of a change (nq) of q, what is left of it once the quaternions have norm 1 again. */
     void (*settle_change)(const struct Mechanism *b, const double *q, double *dq);
+    /* The same along (dt, dq, du, dp), where the angles too come to what they equal. */
+    void (*settle_along)(const struct Mechanism *b, double t, const double *q, const double *u, const double *p,
+                         double dt, double *dq, const double *du, const double *dp);
     /* change (nq) of B v + b along (dt, dq, dv, du, dp); dB (rates): scratch. */
     void (*change)(const struct Mechanism *b, double t, const double *q, const double *v, const double *u,
                    const double *p, double dt, const double *dq, const double *dv, const double *du,

@@ -117,3 +117,13 @@ Status adjoint_back(Sensitivity *w, Mechanism *b, const System *s, const Adjoint
                       w->dv, du);
     return OK;
 }
+
+void adjoint_settle(Sensitivity *w, Mechanism *b, const Adjoint *of, Instant at, const double *q, double *dt) {
+    const System *s = b->system;
+    for (int i = 0; i < s->unwrapped_count; i++) {
+        b->angle[i] = w->dq[s->unwrapped[i]];
+        w->dq[s->unwrapped[i]] = 0;
+    }
+    if (s->unwrapped_count > 0) of->unwrapped(at.t, q, at.u, at.p, b->angle, dt, w->dq, w->du);
+    mechanism_settle_change(b, q, w->dq);
+}

@@ -18,6 +18,8 @@ typedef struct Adjoint {
                       const double *wenergy, double *gt, double *gq, double *gv, double *gu);
     void (*kinematics)(double t, const double *q, const double *u, const double *p, const double *wrates,
                        const double *wdrift, double *gt, double *gq, double *gu);
+    void (*unwrapped)(double t, const double *q, const double *u, const double *p, const double *wangle, double *gt,
+                      double *gq, double *gu);
     void (*outputs)(double t, const double *q, const double *v, const double *u, const double *p, const double *vdot,
                     const double *lambda, const double *Q, const double *ww, const double *wother, double *gt,
                     double *gq, double *gv, double *gu, double *gvdot, double *glambda, double *gQ);
@@ -39,5 +41,8 @@ SHARED void adjoint_weigh_acceleration(Sensitivity *w, const Mechanism *b, int k
  * solved for.  Behind it w->dgiven holds the weights of multipliers that are given. */
 SHARED Status adjoint_back(Sensitivity *w, Mechanism *b, const System *s, const Adjoint *of, Instant at, Observed *o,
                            const double *q, const double *v, double *dt, double *du);
+
+/* Behind that, what is left of w->dq where the states that are set are settled: as kinematics.h's settle_along(). */
+SHARED void adjoint_settle(Sensitivity *w, Mechanism *b, const Adjoint *of, Instant at, const double *q, double *dt);
 
 #endif
