@@ -19,18 +19,17 @@ from .view import View
 SIDE, DOTS = 1.28, 100  # in, and dots an inch
 # of a point: further digits of a place are seen by nobody
 HUNDREDTH = re.compile(rb"(\d+\.\d\d)\d+")
-FORCES = ("arrow", "direction")  # shapes that are no bodies
 
 
 def icon(prepared: Prepared) -> dict[str, bytes]:
     """Path in the FMU -> file: as pixels and as SVG; nothing for a model without a picture, or with one that
     has no place at the start."""
-    picture = picture_of(prepared)
+    picture = picture_of(prepared, forces=False)
     if picture is None:
         return {}
     places, shapes = _places(prepared), []
     for s in picture["shapes"]:
-        if s["kind"] not in FORCES and names_in(s) <= places.keys():
+        if names_in(s) <= places.keys():
             shapes.append(Moving(s, places.__getitem__, 1))
     return _drawn(shapes) if shapes else {}
 

@@ -51,8 +51,9 @@ OPTIONAL = ("length", "radius", "angle", "axis", "coils", "trace")
 IN_FMU = "resources/picture.json"
 
 
-def picture_of(prepared: Prepared) -> dict[str, Any] | None:
-    """The picture of a model in a scene; shapes that need what the FMU does not report are left out.
+def picture_of(prepared: Prepared, forces: bool = True) -> dict[str, Any] | None:
+    """The picture of a model in a scene, with the arrows of its forces or without; shapes that need what the
+    FMU does not report are left out.
 
     Raises ModelError for an expression that cannot be drawn, and for an arrow without a direction.
     """
@@ -64,6 +65,8 @@ def picture_of(prepared: Prepared) -> dict[str, Any] | None:
     problems: list[str] = []
     shapes = []
     for number, shape in enumerate(model.picture, 1):
+        if not forces and isinstance(shape, (Arrow, Direction)):
+            continue
         try:
             shapes.append(_packed(model, shape, prepared.numbers))
         except ValueError as error:
