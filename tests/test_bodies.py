@@ -518,6 +518,32 @@ def test_a_given_start_that_cannot_be_moves_and_is_told_with_both_numbers():
     assert acos(reach) < angle < acos(reach) + 0.05
 
 
+@pytest.mark.parametrize("said_twice", [False, True])
+def test_a_chain_of_seventy_links_begins_where_its_angles_say(said_twice, monkeypatch):
+    """Link k at the angle phi_k = sum a_j is at sum of (cos, sin) phi_j less the half of its own, and moves
+    with w_k = sum a_j'; also where the angles of all links from the ground are given besides.  No dense
+    matrix is decomposed for it."""
+    monkeypatch.setattr(np.linalg, "lstsq", None)
+    n = 70
+    links = [Body(f"b{k}", mass=1.0, inertia=0.1) for k in range(n)]
+    ends = [ground.at((0, 0)), *(b.at((0.5, 0)) for b in links)]
+    hinges = [Revolute(f"J{k}", ends[k], b.at((-0.5, 0))) for k, b in enumerate(links)]
+    turns, rates = 0.1 * np.sin(np.arange(n)), 0.2 * np.cos(np.arange(n))
+    phi, w = np.cumsum(turns), np.cumsum(rates)
+    start = {f"angle.J{k}": turns[k] for k in range(n)}
+    start |= {f"der(angle.J{k})": rates[k] for k in range(n)}
+    if said_twice:
+        start |= {f"b{k}.orientation.z": phi[k] for k in range(n)}
+    model = plane(bodies=links, joints=hinges, start=start)
+    found = {str(s.name if s.is_Function else s): float(x) for s, x in model.start.items()}
+    away, moving = (np.exp(1j * phi), 1j * w * np.exp(1j * phi))
+    for name, part in (("b{}.position.{}", away), ("Derivative(b{}.position.{}(t), t)", moving)):
+        place = np.cumsum(part) - part / 2
+        for k in range(n):
+            at = [found[name.format(k, c)] for c in "xy"]
+            np.testing.assert_allclose(at, [place[k].real, place[k].imag], rtol=0, atol=1e-10)
+
+
 def test_what_cannot_be_closed_says_which_joint_misses():
     """A link of 1 m between pins that are 3 m apart misses by at least 2 m."""
     link = Body("link", 1.0, 0.1)

@@ -17,12 +17,15 @@ from typing import Any
 
 import numpy as np
 import sympy as sp
+from scipy.sparse import csr_array, diags_array, hstack, vstack
 from sympy.core.function import AppliedUndef
 
 from ..errors import LagfmuWarning, ModelError
 from ..model.elements import Contact, Expr, Holonomic, Nonholonomic, name_of
 from ..model.model import Model
 from ..names import derivative
+from ..numeric.linear import divided, factor, norms, row_sizes
+from ..numeric.system import Sparse
 from .branches import CLOSED, has_loop, tell_second_branch
 from .draft import Draft
 from .given import Beginning, given_values, known_names
@@ -35,6 +38,8 @@ TRIES = 12  # beginnings with other omitted values, where the first leads nowher
 LIGHT = 1e-6  # what resists a parameter of a curve, which has no mass, of that of the body
 PARALLEL = 0.99  # cosine of the axes of a universal joint
 REDUNDANT = 1e-11  # a singular value, relative to the largest: rows that say the same
+DENSE = 200  # speeds up to which dense algebra is as quick
+YIELDING, YIELDS = 1e-5, 10  # of a row: its slack; how often at most what is left is done
 EPS = float(np.finfo(float).eps)
 
 
@@ -65,7 +70,7 @@ def assemble(
     f = Rows(model, [condition(model, c) for c in closing])
     held = Rows(model, [known[n][:2] for n in places])
     wanted = np.concatenate([np.zeros(len(closing)), np.array([*places.values()])])
-    moving = _Moving(draft, model)
+    moving = (_Moving if len(model.directions) <= DENSE else _MovingMuch)(draft, model)
     rough = moving.tied(guessed(draft, model, parts, places), places)
     if problems := list(_parallel([c.name for c in closing], f.values(rough))):
         raise ModelError(model.name, problems)
@@ -79,7 +84,7 @@ def assemble(
         raise ModelError(model.name, list(missing))
     _tell(model, places, held.values(q), size)
     _tell_beyond_limits(model, draft, parts, q)
-    if moving.is_determined([f, held], q) and has_loop(draft, parts):
+    if has_loop(draft, parts) and moving.is_determined([f, held], q):
         measures = {n: of.values[0] for n, of in draft.relative.items() if n not in places}
 
         def closed_from(angles: Mapping[str, float]) -> tuple[Array, Array]:
@@ -154,8 +159,7 @@ class _Moving:
 
     def sized(self, q: Array) -> float:
         """The size of the mechanism at q [m], by which its lengths are judged from now on."""
-        at = self._moved.slopes(q) @ np.diag(self.lengths.astype(float))
-        straight = np.abs(at).max(axis=1, initial=0.0) > 0
+        straight = np.abs(self._slopes([self._moved], q)) @ self.lengths > 0
         size = float(np.abs(q[straight]).max(initial=0.0)) or 1.0
         self.scale = np.where(self.lengths, size, 1.0)
         return size
@@ -173,7 +177,7 @@ class _Moving:
 
     def moved(self, q: Array, d: Array) -> Array:
         """The coordinates after a movement."""
-        return self.tied(q + self._moved.slopes(q) @ d)
+        return self.tied(q + self._slopes([self._moved], q) @ d)
 
     def closed(self, rows: Sequence[Rows], wanted: Array, rough: Array) -> tuple[Array, Array]:
         """Coordinates at which the rows have the wanted values, and what each misses, relative to its size.
@@ -203,12 +207,12 @@ class _Moving:
         """Coordinates near q at which the rows have the wanted values, and what each misses: at most
         `enough`, or as little as can be."""
         r, A, size = self._missed(rows, wanted, q)
-        if not (np.isfinite(r).all() and np.isfinite(A).all()):
+        if not (np.isfinite(r).all() and np.isfinite(np.abs(A).sum())):
             return q, np.full(len(r), np.inf)
         for _ in range(STEPS):
             if np.abs(r / size).max(initial=0.0) <= enough:
                 break
-            step = self._least(A / size[:, None], r / size)
+            step = self._least(A, r, size)
             for halved in range(HALVINGS):
                 new = self.moved(q, step * 0.5**halved)
                 after = self._missed(rows, wanted, new)
@@ -219,27 +223,66 @@ class _Moving:
             q, (r, A, size) = new, after
         return q, np.abs(r / size)
 
-    def _missed(self, rows: Sequence[Rows], wanted: Array, q: Array) -> tuple[Array, Array, Array]:
+    def _missed(self, rows: Sequence[Rows], wanted: Array, q: Array) -> tuple[Array, Any, Array]:
         """What is missing (m), the slopes (m, n_v), and how large a change each row sees (m)."""
-        values, slopes = zip(*(row.values_and_slopes(q) for row in rows), strict=True)
-        A = np.vstack(slopes)
-        return wanted - np.concatenate(values), A, self._sizes(A)
+        values, A = self._values_and_slopes(rows, q)
+        return wanted - values, A, self._sizes(A)
 
-    def _sizes(self, A: Array) -> Array:
+    def _values_and_slopes(self, rows: Sequence[Rows], q: Array) -> tuple[Array, Any]:
+        values, slopes = zip(*(row.values_and_slopes(q) for row in rows), strict=True)
+        return np.concatenate(values), np.vstack(slopes)
+
+    def _slopes(self, rows: Sequence[Rows], q: Array) -> Any:
+        return np.vstack([row.slopes(q) for row in rows])
+
+    def _sizes(self, A: Any) -> Array:
         size = np.abs(A * self.scale).max(axis=1, initial=0.0)
         return np.where(size > 0, size, 1.0)
 
-    def _least(self, A: Array, r: Array) -> Array:
-        """d with A d = r as nearly as can be, and least among those."""
+    def _least(self, A: Any, r: Array, size: Array) -> Array:
+        """d with A d = r as nearly as can be, each row by its size, and least among those."""
+        A, r = A / size[:, None], r / size
         d: Array = np.linalg.lstsq(A / self.weight, r, rcond=REDUNDANT)[0] / self.weight
         return d
 
     def velocities(self, rows: Sequence[Rows], wanted: Array, q: Array, v: Array) -> Array:
         """The velocities nearest to v at which the rows have the wanted rates."""
-        A = np.vstack([r.slopes(q) for r in rows])
+        A = self._slopes(rows, q)
         missing = wanted - np.concatenate([r.drifts(q) for r in rows]) - A @ v
-        size = self._sizes(A)
-        return v + self._least(A / size[:, None], missing / size)
+        return v + self._least(A, missing, self._sizes(A))
+
+
+class _MovingMuch(_Moving):
+    """Those of a mechanism with many speeds, by sparse algebra."""
+
+    def _values_and_slopes(self, rows: Sequence[Rows], q: Array) -> tuple[Array, Sparse]:
+        return np.concatenate([row.values(q) for row in rows]), self._slopes(rows, q)
+
+    def _slopes(self, rows: Sequence[Rows], q: Array) -> Sparse:
+        return vstack([row.sparse_slopes(q) for row in rows], format="csr")
+
+    def _sizes(self, A: Sparse) -> Array:
+        size = row_sizes(A.tocoo(), self.scale, np.ones(A.shape[0]))
+        return np.where(size > 0, size, 1.0)
+
+    def _least(self, A: Sparse, r: Array, size: Array) -> Array:
+        """Rows may depend on each other: each may be missed by a slack s, least in d^2 + s^2 with
+        A d + YIELDING |row| s = r, over and over for what is left (iterated Tikhonov regularization; Hansen,
+        Rank-Deficient and Discrete Ill-Posed Problems, sect. 5.1)."""
+        A, r, (m, n) = divided(A, size, self.weight), r / size, A.shape
+        slack = diags_array(YIELDING * np.maximum(norms(A), np.finfo(float).tiny))
+        one = csr_array(diags_array(np.ones(n + m)))
+        factored = factor(one, hstack([A, slack], format="csr"))
+        if factored is None:
+            return np.zeros(n)
+        d = np.zeros(n)
+        for _ in range(YIELDS):
+            more = factored.solve(np.zeros(n + m), r - A @ d)[0][:n]
+            d += more
+            if np.abs(more).max() <= EPS * np.abs(d).max():
+                break
+        found: Array = d / self.weight
+        return found
 
 
 def _parallel(names: Sequence[str], values: Array) -> Iterator[str]:

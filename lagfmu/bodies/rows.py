@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 from sympy.core.function import AppliedUndef
 from sympy.physics.vector import dynamicsymbols
 
@@ -21,6 +22,7 @@ from ..model.closing import Closing, computed
 from ..model.differential import Differential
 from ..model.elements import Constraint, Expr, Nonholonomic, Tie
 from ..model.model import Model
+from ..numeric.system import Sparse
 
 TIME = dynamicsymbols._t
 Array = NDArray[np.float64]
@@ -89,6 +91,15 @@ class Rows:
     def slopes(self, q: Array) -> Array:
         """Their slopes by the speeds (m, n_v)."""
         return self.values_and_slopes(q)[1]
+
+    def sparse_slopes(self, q: Array) -> Sparse:
+        """The same, sparse."""
+        found = [(np.zeros(0), np.zeros(0, dtype=int), np.zeros(0, dtype=int))]
+        for f, parts in self._at(q):
+            rows = np.broadcast_to(f.rows[:, None], f.speeds.shape)
+            found.append((parts[2:].T.ravel(), rows.ravel(), f.speeds.ravel()))
+        values, row, speed = map(np.concatenate, zip(*found, strict=True))
+        return csr_array((values, (row, speed)), self.shape)
 
 
 @dataclass

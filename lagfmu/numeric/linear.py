@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lapack, qr, solve_triangular
 from scipy.sparse import coo_array, csc_array, csr_array
-from scipy.sparse.csgraph import connected_components
+from scipy.sparse.csgraph import connected_components, structural_rank
 from scipy.sparse.linalg import splu
 
 from .failure import MasslessError, StepFailureError
@@ -109,10 +109,10 @@ def factor(M: Sparse, G: Sparse, least: float = 0.0, from_masses: bool = False) 
     if from_masses:
         has = M.diagonal() > 0
         d[:n][has] = 2.0 ** -np.round(np.log2(M.diagonal()[has]) / 2)
-        row = _largest(G.tocoo(), d[:n], np.ones(G.shape[0]))
+        row = row_sizes(G.tocoo(), d[:n], np.ones(G.shape[0]))
         d[n:] = 2.0 ** -np.round(np.log2(np.where(row > 0, row, 1.0)))
     for _ in range(20):
-        largest = _largest(K, d, d)
+        largest = row_sizes(K, d, d)
         if not (largest > 0).all():
             return None
         if (np.abs(np.log2(largest)) <= 1).all():
@@ -121,6 +121,8 @@ def factor(M: Sparse, G: Sparse, least: float = 0.0, from_masses: bool = False) 
     if not len(d):
         return None
     A = csr_array((K.data * d[K.row] * d[K.col], (K.row, K.col)), K.shape)
+    if structural_rank(A) < len(d):  # SuperLU's BLAS would write about it to the terminal
+        return None
     try:
         lu = splu(A.tocsc())
     except RuntimeError:
@@ -151,7 +153,7 @@ def _kkt(M: Sparse, G: Sparse) -> Sparse:
     return coo_array((np.concatenate([M.data, G.data, G.data]), (row, column)), (size, size))
 
 
-def _largest(A: Sparse, right: Vector, left: Vector) -> Vector:
+def row_sizes(A: Sparse, right: Vector, left: Vector) -> Vector:
     """The largest magnitude in each row of diag(left) A diag(right)."""
     found = np.zeros(A.shape[0])
     np.maximum.at(found, A.row, np.abs(A.data) * right[A.col])
@@ -282,10 +284,10 @@ def _least_norm(
 
 def independent(M: Sparse, G: Sparse) -> list[int]:
     """Of the rows of G, as many as are independent."""
-    W = _rows_scaled(G, _largest(G.tocoo(), np.ones(G.shape[1]), np.ones(G.shape[0])))
     mass = np.where(M.diagonal() > 0, M.diagonal(), 1.0)
-    W = csr_array(W / np.sqrt(mass))
-    W = _rows_scaled(W, norms(W))
+    largest = row_sizes(G.tocoo(), np.ones(G.shape[1]), np.ones(G.shape[0]))
+    W = divided(divided(G, largest), np.ones(G.shape[0]), np.sqrt(mass))
+    W = divided(W, norms(W))
     if stand_apart(W):
         return list(range(G.shape[0]))
     R, order = qr(W.toarray().T, mode="r", pivoting=True)
@@ -307,6 +309,9 @@ def norms(G: Sparse) -> Vector:
     return found
 
 
-def _rows_scaled(G: Sparse, size: Vector) -> Sparse:
-    """Each row divided by its size."""
-    return csr_array(G / np.maximum(size, np.finfo(float).tiny)[:, None])
+def divided(G: Sparse, rows: Vector, columns: Vector | None = None) -> Sparse:
+    """Each row divided by a size, 0 or more, and each column."""
+    G = G.tocoo()
+    data = G.data / np.maximum(rows, np.finfo(float).tiny)[G.row]
+    data = data if columns is None else data / columns[G.col]
+    return csr_array((data, (G.row, G.col)), G.shape)
