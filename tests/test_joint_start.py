@@ -6,7 +6,7 @@ import math
 import re
 import warnings
 from collections.abc import Callable
-from ctypes import c_double
+from ctypes import c_double, c_size_t
 from math import acos, asin, cos, pi, sin
 from pathlib import Path
 from typing import Any
@@ -151,6 +151,22 @@ def test_what_was_set_is_part_of_a_saved_state(library: Any) -> None:
     one.does("Reset")
     one.start()
     assert one.get("angle.A") == pytest.approx(pi / 4, rel=1e-14)
+
+
+def test_derivatives_are_taken_by_states_alone(library: Any) -> None:
+    """The angle of a joint is none, settable as it is at the start."""
+    one = library(NAME)().start()
+    size, reals = c_size_t(1), (c_double * 1)
+    arguments = (
+        one.references(["force.A.x"]),
+        size,
+        one.references(["angle.A"]),
+        size,
+        reals(1.0),
+        reals(),
+    )
+    said = one.refuses("GetDirectionalDerivative", *arguments)
+    assert "a change of 'angle.A'" in said
 
 
 def four_bar(**start: float) -> Any:
