@@ -44,13 +44,16 @@ static Status find_joint_places(Solver *s, int *rows) {
     joint_measure(s, x->q);
     double off = joint_missing(s, NULL);
     for (int count = 0, there = off <= JOINT_REACHED; count < JOINT_STEPS && there < 2; count++) {
-        double far = 0, part, less = HUGE_VAL;
+        double far = 0, less = HUGE_VAL;
         if (mechanism_evaluate(&s->stepped, x->at, x->q, x->zero) != OK || joint_step(s, rows) != OK) return FAILED;
         for (int i = 0; i < of->nv; i++)
             if (s->state.span[i] > 0) far = fmax(far, fabs(x->d[i]) / (JOINT_SHORT * s->state.span[i]));
-        part = far > 1 ? 1 / far : 1;
-        for (int k = 0; k < JOINT_HALVINGS && !(less < off); k++, part /= 2) less = try_joints(s, part, rows);
-        if (!(less < off)) break;
+        double part = far > 1 ? 2 / far : 2;
+        for (int k = 0; k < JOINT_HALVINGS && !(less < (1 - 0.1 * part) * off); k++) {
+            part /= 2;
+            less = try_joints(s, part, rows);
+        }
+        if (!(less < (1 - 0.1 * part) * off)) break;
         memcpy(x->q, x->trial, (size_t)of->nq * sizeof *x->q);
         off = less;
         there += off <= JOINT_REACHED; /* one step more leaves rounding */
