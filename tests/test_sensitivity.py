@@ -54,6 +54,27 @@ def test_a_model_file_gets_derivatives_of_its_own(tmp_path):
 
 
 @pytest.mark.skipif("not __import__('shutil').which('cc')", reason="no C compiler")
+def test_a_body_on_a_floor_keeps_its_derivatives_by_parameters():
+    """A disk that rolls from rest, y = g sin(alpha) t^2/(2 (1 + kappa)): 1, -kappa/(1 + kappa) and
+    alpha/tan(alpha) parts in 100, from the FMU, though by the start of z, at which it lies on the incline,
+    there is none."""
+    found = sensitivity(MODELS / "incline_friction.py", ["y"], "all")
+    by = {name: k for k, name in enumerate(found.points)}
+    angle = math.pi / 6
+    for name, part in {
+        "g": 1,
+        "kappa": -1 / 3,
+        "alpha": angle / math.tan(angle),
+        "M": 0,
+        "mu_s": 0,
+    }.items():
+        assert found.own[0, by[name]], name
+        assert found.relative[0, by[name]] == pytest.approx(part, abs=1e-9), name
+    assert not found.own[0, by["z"]]
+    assert np.isnan(found.derivatives[0, by["z"]])
+
+
+@pytest.mark.skipif("not __import__('shutil').which('cc')", reason="no C compiler")
 def test_the_best_friction_of_the_documentation_is_the_best(tmp_path, monkeypatch):
     """As printed in docs/sensitivities.md: between no friction and a cart that stands still there is one at
     which least energy is left after 10 s; on both sides of it there is more."""

@@ -147,8 +147,9 @@ def _print_derivatives(found: Any) -> None:
         print_whole(console, table)
     if not found.own.all():
         these = "derivatives" if not found.own.any() else f"{int((~found.own).sum())} derivatives"
+        ended = ": those of the FMU end within the run (sensitivity.valid)" if found.ended else ""
         say(
-            f"{these} by central differences of runs, relative step {found.step:.1e}",
+            f"{these} by central differences of runs, relative step {found.step:.1e}{ended}",
             "note:",
             "cyan",
         )

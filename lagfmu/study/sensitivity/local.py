@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -45,7 +45,8 @@ ALL = "all"
 class Sensitivity:
     """Derivatives (outputs, parameters) at the end of a run, in the units [output]/[parameter], NaN where
     there is none; `why`: of each of these the reason; `own`: of each whether the FMU gave it; `values` and
-    `points`: of outputs and parameters, by name; `step`: of differences, relative."""
+    `points`: of outputs and parameters, by name; `step`: of differences, relative; `ended`: the FMU tells
+    derivatives, and they ended within the run."""
 
     name: str
     stop_time: float
@@ -56,6 +57,7 @@ class Sensitivity:
     own: NDArray[np.bool_]
     units: Mapping[str, str]
     step: float
+    ended: bool = False
 
     @property
     def relative(self) -> Floats:
@@ -168,11 +170,38 @@ def made_for(
     to: Sequence[str] | str = ALL,
     scene: Scene | str | None = None,
 ) -> Iterator[Path]:
-    """An FMU as it is; of a model, or a model file, one that tells derivatives and extremes among `of`."""
-    by = "*" if to in (ALL, [ALL], (ALL,)) else ",".join(to)
+    """An FMU as it is; of a model, or a model file, one that tells derivatives and extremes among `of`.
+
+    A start by which there are none, as that of a body on a floor, would end those by all others: where all
+    are asked for and the run begins so, the FMU tells those by parameters alone."""
+    everything = to in (ALL, [ALL], (ALL,))
     peaks = [n for text in of if (n := names.measured(text))]
-    with as_fmu(source, scene, peaks=peaks, sensitivities=[f"{','.join(of)}:{by}"]) as path:
+
+    def told(by: Iterable[str]) -> contextlib.AbstractContextManager[Path]:
+        return as_fmu(source, scene, peaks=peaks, sensitivities=[f"{','.join(of)}:{','.join(by)}"])
+
+    with told("*" if everything else to) as path:
+        parameters = _parameters_alone(path) if everything else []
+        if not parameters:
+            yield path
+            return
+    with told(parameters) as path:
         yield path
+
+
+def _parameters_alone(fmu: Path) -> list[str]:
+    """Its parameters, where it tells derivatives and begins without; else none."""
+    description = read_description(fmu)
+    variables = {v.name: v for v in description.modelVariables}
+    if names.SENSITIVITY_VALID not in variables or obstacle(fmu, description):
+        return []
+    with Session(fmu) as session:
+        times = [0.0, experiment_of(description).step_size]
+        run = session.run(times, {}, TOLERANCE, [names.SENSITIVITY_VALID], late=True)
+        if len(run.rows) == 0 or run.rows[names.SENSITIVITY_VALID][0]:
+            return []
+    rules = described_rules(description)
+    return [n for n in settable(variables, rules) if variables[n].causality == "parameter"]
 
 
 def settable(variables: Mapping[str, Any], rules: Mapping[str, Rule]) -> list[str]:
@@ -256,7 +285,8 @@ def _found(
         base = runs.end(given, [*told.values(), *flag])
     except RefusalError as error:
         raise SimulationError(f"the run at the given values fails: {error.message}") from None
-    if flag and not base[flag[0]]:
+    ended = bool(flag) and not base[flag[0]]
+    if ended:
         told = {}  # from some event on there is none: differences tell what can be told
     step = runs.tolerance ** (1 / 3)
     slopes = np.full((len(of), len(start)), np.nan)
@@ -279,7 +309,7 @@ def _found(
     stop = float(runs.points[-1])
     values = {o: base[o] for o in of}
     return Sensitivity(
-        description.modelName, stop, values, dict(start), slopes, why, own, units, step
+        description.modelName, stop, values, dict(start), slopes, why, own, units, step, ended
     )
 
 
