@@ -1,17 +1,17 @@
 """What do others take for the forces of constraint?  Drake, exudyn, heyoka, MuJoCo, Pinocchio with SciPy.
 
     pip install drake exudyn heyoka mujoco pin # those that you want; what is not there is skipped, and said
-    python benchmarks/others.py [--out DIR] [--rounds N] [pendulum|horizontal|chain|windows|squeezer ...]
+    python benchmarks/others.py [--out DIR] [--rounds N] [pendulum|chain|windows|bricard ...]
 
 pendulum: one bob on a massless rod, 10 s; horizontal: as the IFToMM library's A01 has it.  chain: four of
-them hanging from each other, 2 s.  windows, squeezer: closed loops, A02 and A03 of that library (loops.py).
-Asked of each are the tensions of the rods, or the forces in the pins that close the loops, at equidistant
-times; an error is the largest over samples and components, relative to the largest of them, against a
-reference that shares no code with any of them (rods.py, independent/).  Printed are error and cost at each
-setting, then the costs at errors of 1e-3, 1e-6 and 1e-9, and the least error that was reached.  A cost is
-the processor time of stepping and reading, in microseconds a simulated second; building the model is not
-counted.  Programs run interleaved, N rounds; medians.  What each does differently: RESULTS.md.  Needs gcc
-for the C host.
+them hanging from each other, 2 s.  windows, squeezer: closed loops, A02 and A03 of that library (loops.py);
+bricard, governor: A04 and A05, in space (space.py).  Asked of each are the tensions of the rods, the forces
+in the pins that close the loops, or what joints and springs do to each body, at equidistant times; an error
+is the largest over samples and components, relative to the largest of them, against a reference that shares no
+code with any of them (rods.py, independent/).  Printed are error and cost at each setting, then the costs at
+errors of 1e-3, 1e-6 and 1e-9, and the least error that was reached.  A cost is the processor time of stepping
+and reading, in microseconds a simulated second; building the model is not counted.  Programs run interleaved,
+N rounds; medians.  What each does differently: RESULTS.md.  Needs gcc for the C host.
 """
 
 from __future__ import annotations
@@ -33,26 +33,30 @@ import loops_elsewhere
 import numpy as np
 import rods
 import rods_elsewhere
+import space
+import space_elsewhere
 from fmpy.fmi2 import FMU2Slave
 from loops import Loops
 from programs import BUDGET, Curve, Ours, launch, unpacked
 from rods import Rods
+from space import Space
 
 from lagfmu import build_fmu
 from lagfmu.model.file import load
 
 MODELS = Path(__file__).parent.parent / "models"
 SCENES = {"chain": "Chain"}  # of rods.py; else the pendulum's
-PROBLEMS = {**rods.PROBLEMS, **loops.PROBLEMS}
+PROBLEMS = {**rods.PROBLEMS, **loops.PROBLEMS, **space.PROBLEMS}
 TOLERANCES = [10.0**-k for k in range(3, 14)]
 TARGETS = (1e-3, 1e-6, 1e-9)
-Problem = Rods | Loops
+Problem = Rods | Loops | Space
+ELSEWHERE = {Rods: rods_elsewhere, Loops: loops_elsewhere, Space: space_elsewhere}
 Read = Callable[[Any], Any]  # outputs (samples, m) -> forces (samples, k)
 
 
 def our_fmu(problem: Problem, out: Path) -> tuple[Path, Ours, list[str], Read]:
     """The folder of the native FMU, its binary, the outputs that are read, and what they say."""
-    if isinstance(problem, Loops):
+    if not isinstance(problem, Rods):
         fmu = problem.build(out)
         return fmu.with_suffix(""), unpacked(fmu, out), problem.outputs, problem.read
     file = load(MODELS / f"{'chain' if problem.name in SCENES else 'pendulum'}.py")
@@ -122,8 +126,7 @@ def jobs_of(
         ],
         "lagfmu native, fmpy's calls": [(tol, lambda tol=tol: in_fmpy(tol)) for tol in TOLERANCES],
     }
-    elsewhere = loops_elsewhere if isinstance(problem, Loops) else rods_elsewhere
-    for peer in elsewhere.PEERS:
+    for peer in ELSEWHERE[type(problem)].PEERS:
         try:
             version = importlib.metadata.version(peer.package)
         except importlib.metadata.PackageNotFoundError:

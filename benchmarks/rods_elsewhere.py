@@ -30,7 +30,7 @@ class Peer:
     label: str
     package: str
     settings: Sequence[float]
-    prepare: Callable[[Rods, float], Run]
+    prepare: Callable[[Any, float], Run]  # of a problem and a setting
 
 
 def drake_joints(scheme: str) -> Callable[[Rods, float], Run]:

@@ -36,6 +36,11 @@ from lagfmu.bodies import (
 WINDOWS = 2  # N of A02
 ROD, BASE, BALL, SIDE, HALF = 0.3, 3.0, 5.0, 0.05, 0.5  # of A05: kg, kg, kg, m, m
 STIFFNESS, DAMPING, FREE = 8e5, 4e4, 0.5  # N/m, N s/m, m
+SHAFT = ROD * (1 + 0.01**2) / 12, ROD * 0.01**2 / 6  # kg m2, across and along a rod 0.01 m square
+CUBE = BASE * 0.1**2 / 6  # of the base
+ARM = ROD + BALL  # kg, a rod and its ball
+MIDDLE = HALF * (ROD + 2 * BALL) / ARM  # of these, from the hinge
+ACROSS = SHAFT[0] + ROD * (MIDDLE - HALF) ** 2 + BALL * (2 * HALF - MIDDLE) ** 2
 
 
 def pendulum() -> System:
@@ -108,7 +113,7 @@ def squeezer() -> System:
     return System(andrews.model(), 0.05, andrews.squeezer().expected)
 
 
-def bricard() -> System:
+def bars() -> Linkage:
     """A04, with z upward."""
     ends = np.array(
         [[0, 0, 0], [1, 0, 0], [1, 0, -1], [1, -1, -1], [0, -1, -1], [0, -1, 0]], dtype=float
@@ -120,28 +125,27 @@ def bricard() -> System:
         f"J{k}": Tie("hinge", names[k], names[k + 1], ends[k].tolist(), axis.tolist())
         for k, axis in enumerate(np.abs(np.cross(np.roll(ways, 1, axis=0), ways)))
     }
-    return Linkage("A04", bodies, ties, {"bar1": (0.0, 0.0, 0.0)}, G).system(2.0)
+    return Linkage("A04", bodies, ties, {"bar1": (0.0, 0.0, 0.0)}, G)
+
+
+def bricard() -> System:
+    """A04."""
+    return bars().system(2.0)
 
 
 def governor() -> System:
     """A05: the shaft turns by psi, both rods hang theta below the horizontal, the base is at s; they stay
     in a plane through the shaft, alike.  Lagrange's equations of psi, theta, s."""
-    thick, cube, m = 0.01, 0.1, ROD + BALL
-    middle = HALF * (ROD + 2 * BALL) / m  # of rod and ball, from the hinge
-    along = ROD * thick**2 / 6
-    across = (
-        ROD * (1 + thick**2) / 12 + ROD * (middle - HALF) ** 2 + BALL * (2 * HALF - middle) ** 2
-    )
     ground = Ground()
-    shaft = Body("shaft", ROD, (*[ROD * (1 + thick**2) / 12] * 2, along), center=(0, 0, HALF))
-    base = Body("base", BASE, (BASE * cube**2 / 6,) * 3)
+    shaft = Body("shaft", ROD, (SHAFT[0], *SHAFT), center=(0, 0, HALF))
+    base = Body("base", BASE, (CUBE,) * 3)
     joints = [
         Revolute("bearing", ground.at((0, 0, 0)), shaft.at((0, 0, 0))),
         Prismatic("guide", shaft.at((0, 0, 0)), base.at((0, 0, 0))),
     ]
     bodies, loads = [shaft, base], [Gravity((0, 0, -G))]
     for name, side in (("right", 1), ("left", -1)):
-        rod = Body(name, m, (along, across, across), center=(side * middle, 0, 0))
+        rod = Body(name, ARM, (SHAFT[1], ACROSS, ACROSS), center=(side * MIDDLE, 0, 0))
         hung = shaft.at((side * SIDE, 0, 2 * HALF))
         joints.append(Revolute(f"{name}_hinge", hung, rod.at((0, 0, 0)), axis="y"))
         ends = rod.at((side * HALF, 0, 0)), base.at((side * SIDE, 0, 0))
@@ -154,52 +158,70 @@ def governor() -> System:
         "shaft.omega": (0.0, 0.0, 2 * pi),
     }
     model = mechanism("A05", bodies=bodies, joints=joints, loads=loads, start=start)
-    turning = along + BASE * cube**2 / 6  # kg m2, of shaft and base about the axis
-
-    def spring(theta: float, dtheta: float, s: float, ds: float) -> tuple[float, float, float]:
-        """Its pull, and how its length grows with theta and with s."""
-        x, z = HALF * cos(theta), 2 * HALF - HALF * sin(theta) - s
-        d = sqrt(x * x + z * z)
-        by_theta = (-x * HALF * sin(theta) - z * HALF * cos(theta)) / d
-        by_s = -z / d
-        return STIFFNESS * (d - FREE) + DAMPING * (by_theta * dtheta + by_s * ds), by_theta, by_s
-
-    def rate(_: float, y: Vector) -> tuple[float, ...]:
-        theta, s, w, dtheta, ds = y
-        r = SIDE + middle * cos(theta)
-        held = turning + 2 * (m * r**2 + across * cos(theta) ** 2 + along * sin(theta) ** 2)
-        slope = 2 * sin(theta) * (-2 * m * r * middle + 2 * (along - across) * cos(theta))
-        pull, by_theta, by_s = spring(theta, dtheta, s, ds)
-        bend = slope * w**2 / 4 + m * G * middle * cos(theta) - pull * by_theta
-        return (
-            dtheta,
-            ds,
-            -slope * dtheta * w / held,
-            bend / (across + m * middle**2),
-            -G - 2 * pull * by_s / BASE,
-        )
 
     def expected(stop: float) -> Mapping[str, float]:
         """The right rod's hinge in the axes of the shaft."""
-        y = integrate(rate, (pi / 6, HALF, 2 * pi, 0.0, 0.0), stop)
-        theta, s, w, dtheta, ds = y
-        _, _, dw, bend, _ = rate(stop, y)
-        c, d = middle * cos(theta), middle * sin(theta)
-        r = SIDE + c
-        a = np.array(
-            [
-                -c * dtheta**2 - d * bend - r * w**2,
-                r * dw - 2 * d * dtheta * w,
-                d * dtheta**2 - c * bend,
-            ]
-        )
-        pull, _, _ = spring(theta, dtheta, s, ds)
+        theta, s, w, dtheta, ds, _ = y = integrate(flyballs, FLYBALLS, stop)
+        pull, _, _ = _spring(theta, dtheta, s, ds)
         way = np.array([-HALF * cos(theta), 0, s - 2 * HALF + HALF * sin(theta)])
-        force = m * (a + np.array([0, 0, G])) - pull * way / np.linalg.norm(way)
+        force = ARM * (swing(y) + np.array([0, 0, G])) - pull * way / np.linalg.norm(way)
         named = {f"force.right_hinge.{x}": f for x, f in zip("xyz", force.tolist(), strict=True)}
         return named | {"position.guide": s, "shaft.omega.z": w, "angle.right_hinge": theta}
 
     return System(model, 2.0, expected)
+
+
+FLYBALLS = (
+    pi / 6,
+    HALF,
+    2 * pi,
+    0.0,
+    0.0,
+    0.0,
+)  # theta, s, psi', theta', s', psi of A05 at the start
+
+
+def flyballs(_: float, y: Vector) -> tuple[float, ...]:
+    """y' of A05."""
+    theta, s, w, dtheta, ds, _ = y
+    r = SIDE + MIDDLE * cos(theta)
+    held = SHAFT[1] + CUBE
+    held += 2 * (ARM * r**2 + ACROSS * cos(theta) ** 2 + SHAFT[1] * sin(theta) ** 2)
+    slope = 2 * sin(theta) * (-2 * ARM * r * MIDDLE + 2 * (SHAFT[1] - ACROSS) * cos(theta))
+    pull, by_theta, by_s = _spring(theta, dtheta, s, ds)
+    bend = slope * w**2 / 4 + ARM * G * MIDDLE * cos(theta) - pull * by_theta
+    return (
+        dtheta,
+        ds,
+        -slope * dtheta * w / held,
+        bend / (ACROSS + ARM * MIDDLE**2),
+        -G - 2 * pull * by_s / BASE,
+        w,
+    )
+
+
+def swing(y: Vector) -> Vector:
+    """The acceleration of A05's right rod with its ball, in the axes of the shaft."""
+    theta, _, w, dtheta, _, _ = y
+    _, _, dw, bend, _, _ = flyballs(0.0, y)
+    c, d = MIDDLE * cos(theta), MIDDLE * sin(theta)
+    r = SIDE + c
+    return np.array(
+        [
+            -c * dtheta**2 - d * bend - r * w**2,
+            r * dw - 2 * d * dtheta * w,
+            d * dtheta**2 - c * bend,
+        ]
+    )
+
+
+def _spring(theta: float, dtheta: float, s: float, ds: float) -> tuple[float, float, float]:
+    """Its pull, and how its length grows with theta and with s."""
+    x, z = HALF * cos(theta), 2 * HALF - HALF * sin(theta) - s
+    d = sqrt(x * x + z * z)
+    by_theta = (-x * HALF * sin(theta) - z * HALF * cos(theta)) / d
+    by_s = -z / d
+    return STIFFNESS * (d - FREE) + DAMPING * (by_theta * dtheta + by_s * ds), by_theta, by_s
 
 
 SYSTEMS = [pendulum, windows, squeezer, bricard, governor]

@@ -48,7 +48,7 @@ class Tie:
 
 @dataclass(frozen=True)
 class Spring:
-    """Between two places of the start: stiffness [N/m] and length without force [m]."""
+    """Between two places of the start: stiffness [N/m], length without force [m], damping [N s/m]."""
 
     first: str
     second: str
@@ -56,6 +56,12 @@ class Spring:
     other: Point
     k: float
     length: float
+    c: float = 0.0
+
+    def pull(self, d: Vector, rate: Vector) -> Vector:
+        """On its second body [N], d [m] beyond its first's place, which draws away at `rate` [m/s]."""
+        size = np.linalg.norm(d)
+        return -(self.k * (size - self.length) + self.c * (rate @ d) / size) * d / size
 
 
 @dataclass(frozen=True)
@@ -97,11 +103,10 @@ class Linkage:
             first, second = numbers[spring.first], numbers[spring.second]
             a, b = self.arm(spring.first, spring.point), self.arm(spring.second, spring.other)
             d = look.point(second, b) - look.point(first, a)
-            size = np.linalg.norm(d)
-            force = spring.k * (size - spring.length) * d / size
+            force = spring.pull(d, look.rate(second, b) - look.rate(first, a))
             return {
-                first: np.array([*force, *np.cross(look.arm(first, a), force)]),
-                second: -np.array([*force, *np.cross(look.arm(second, b), force)]),
+                first: -np.array([*force, *np.cross(look.arm(first, a), force)]),
+                second: np.array([*force, *np.cross(look.arm(second, b), force)]),
             }
 
         masses, places = zip(*self.bodies.values(), strict=True)
@@ -143,7 +148,7 @@ class Linkage:
         loads: list[Any] = [Gravity((0, 0, -self.gravity))]
         for k, spring in enumerate(self.springs):
             a, b = marker(spring.first, spring.point), marker(spring.second, spring.other)
-            loads.append(SpringDamper(f"spring{k}", a, b, spring.k, spring.length))
+            loads.append(SpringDamper(f"spring{k}", a, b, spring.k, spring.length, spring.c))
         return mechanism(
             self.name,
             bodies=[body for body in made.values() if isinstance(body, Body)],
