@@ -7,8 +7,8 @@ pendulum: one bob on a massless rod, 10 s; horizontal: as the IFToMM library's A
 them hanging from each other, 2 s.  windows, squeezer: closed loops, A02 and A03 of that library (loops.py);
 bricard, governor: A04 and A05, in space (space.py).  Asked of each are the tensions of the rods, the forces
 in the pins that close the loops, or what joints and springs do to each body, at equidistant times; an error
-is the largest over samples and components, relative to the largest of them, against a reference that shares no
-code with any of them (rods.py, independent/).  Printed are error and cost at each setting, then the costs at
+is the largest over samples and components, relative to the largest of them, against a reference that shares
+no code with any of them (rods.py, independent/).  Printed are error and cost at each setting, then costs at
 errors of 1e-3, 1e-6 and 1e-9, and the least error that was reached.  A cost is the processor time of stepping
 and reading, in microseconds a simulated second; building the model is not counted.  Programs run interleaved,
 N rounds; medians.  What each does differently: RESULTS.md.  Needs gcc for the C host.
