@@ -118,3 +118,47 @@ def test_a_table_that_drops_away_is_left(driven):
         assert one.get("departure.table.count") == 1
         assert one.get("lambda.table") == 0
         assert one.get("y") == pytest.approx(-G * 0.1**2 / 2, abs=1e-9)
+
+
+@pytest.mark.parametrize("told", [1.0, 0.0])
+def test_a_stack_comes_to_rest_on_a_table_that_moves(built, told):
+    """A ball bounces on one that bounces on a table u = 0.05 sin 5 t.  Where the table has gone on otherwise
+    than its derivatives foresaw, the lower ball goes with it and pushes the upper one, though these two are
+    apart.  In the end both ride, if the rates of u are `told`: lambda = (m + M) (g + u'') below, M (g + u'')
+    between them."""
+    v = dynamicsymbols("v")
+    e, M = symbols("e M", positive=True)
+    model = Model(
+        name="Stack",
+        lagrangian=(m * y.diff() ** 2 + M * v.diff() ** 2) / 2 - m * g * y - M * g * v,
+        coordinates={y: "m", v: "m"},
+        constraints=[
+            Contact("table", y - u, restitution=e),
+            Contact("ball", v - y, restitution=e),
+        ],
+        parameters=[
+            Parameter(m, 1.0, "kg"),
+            Parameter(M, 0.5, "kg"),
+            Parameter(e, 0.4, "1"),
+            Parameter(g, G, "m/s^2"),
+        ],
+        inputs=[Input(u, "m")],
+        start={y: 0.3, v: 0.9},
+    )
+    A, w = 0.05, 5.0
+
+    def moves(one, told):
+        u = A * np.sin(w * one.time), told * A * w * np.cos(w * one.time)
+        drive(one, (*u, -told * w**2 * u[0]))
+
+    with instance(built(model)) as one:
+        one.start(tolerance=1e-8)
+        while one.time < 3.0:
+            moves(one, told)
+            assert one.get("v") > one.get("y") - 1e-12
+            one.step(0.01)
+        moves(one, told=1.0)
+        if told:
+            weight = G - A * w**2 * np.sin(w * one.time)
+            assert one.get("lambda.table") == pytest.approx(1.5 * weight, rel=1e-6)
+            assert one.get("lambda.ball") == pytest.approx(0.5 * weight, rel=1e-6)

@@ -12,6 +12,7 @@ AT_EVENTS = {"events_find": "events.c"}
 AT_CONTACTS = {
     "contacts_modes": "contacts.c",
     "impact_check": "impact.c",
+    "landing_push_out": "landing.c",
     "landing_bring_back": "landing.c",
     "modes_switch": "modes.c",
     "modes_departures": "modes.c",

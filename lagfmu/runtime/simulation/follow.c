@@ -14,8 +14,9 @@ static Status carry(Solver *s) {
     else if (OPTIONAL.modes_departures(s, s->state.now.span, 0) != OK)
         return FAILED;
     const Instant at = segment_instant(s, s->state.now.t);
-    return mechanism_project(&s->stepped, at, s->state.q, s->state.v, s->active, s->state.offset,
-                             s->state.span);
+    if (mechanism_project(&s->stepped, at, s->state.q, s->state.v, s->active, s->state.offset, s->state.span) != OK)
+        return FAILED;
+    return system->contacts > 0 ? OPTIONAL.landing_push_out(s) : OK;
 }
 
 static Status follow_contacts(Solver *s) {

@@ -1,11 +1,13 @@
-/* landing.c -- a state that an importer's solver (Model Exchange) has carried through a contact, brought
- * back onto it.
+/* landing.c -- a state inside contacts, brought back onto them.
  *
- * A solver stops where it sees that f has changed its sign, a little inside, f = -d; a slow rebound from
- * there would never come out.  So q goes back onto f = 0, and what the way inside has added to the speed
- * is taken off, s^2 <- s^2 - 2 a d with the acceleration a towards the contact: without it bounces with e
- * near 1 would not die out, e^2 (h + d) = h.  A contact that is inside and already departs, though it is
- * pulled back, has been in a flight too short for the solver's steps: it is at rest, s = 0. */
+ * A motion that is prescribed anew takes along what is closed, and that may so come inside what is open.
+ *
+ * In Model Exchange an importer's solver carries it through a contact.  It stops where it sees that f has
+ * changed its sign, a little inside, f = -d; a slow rebound from there would never come out.  So q goes back onto
+ * f = 0, and what the way inside has added to the speed is taken off, s^2 <- s^2 - 2 a d with the acceleration a
+ * towards the contact: without it bounces with e near 1 would not die out, e^2 (h + d) = h.  A contact that is
+ * inside and already departs, though it is pulled back, has been in a flight too short for the solver's steps: it
+ * is at rest, s = 0. */
 #include "modes.h"
 
 #include <math.h>
@@ -28,6 +30,31 @@ static void set_changes(Solver *s, const int *happened, const double *pull, cons
     }
 }
 
+/* The positions; velocities may change only in an impact. */
+static Status push_out(Solver *s, const int *acting, double *v) {
+    memcpy(v, s->state.v, (size_t)s->system->nv * sizeof *v);
+    return mechanism_project(&s->stepped, segment_instant(s, s->state.now.t), s->state.q, v, acting, s->state.offset,
+                             s->state.span);
+}
+
+Status landing_push_out(Solver *s) {
+    const System *system = s->system;
+    Mechanism *b = &s->stepped;
+    int *acting = s->iwork_initial, inside;
+    system_active(system, s->state.closed, acting);
+    do { /* what goes out may come inside another */
+        inside = 0;
+        if (mechanism_residual(b, segment_instant(s, s->state.now.t), s->state.q, b->f) != OK) return FAILED;
+        for (int c = 0; c < system->contacts; c++) {
+            const int k = system->contact[c];
+            if (acting[k] || b->f[k] >= 0) continue;
+            acting[k] = inside = 1;
+        }
+        if (inside && push_out(s, acting, s->work_initial) != OK) return FAILED;
+    } while (inside);
+    return OK;
+}
+
 Status landing_bring_back(Solver *s, const int *happened, const double *pull) {
     const System *system = s->system;
     const Instant at = segment_instant(s, s->state.now.t);
@@ -44,9 +71,7 @@ Status landing_bring_back(Solver *s, const int *happened, const double *pull) {
         any |= acting[k] && (happened[c] || !s->state.closed[c]);
     }
     if (!any) return OK;
-    memcpy(v, s->state.v, (size_t)system->nv * sizeof *v);
-    if (mechanism_project(b, at, s->state.q, v, acting, s->state.offset, s->state.span) != OK)
-        return FAILED; /* the positions; velocities may change only in an impact */
+    if (push_out(s, acting, v) != OK) return FAILED;
     if (mechanism_evaluate(b, at, s->state.q, s->state.v) != OK) return FAILED;
     set_changes(s, happened, pull, depth, change);
     if (linear_factor(&b->linear, b->M, b->G, acting) != OK) return FAILED;

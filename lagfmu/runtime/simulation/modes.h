@@ -21,7 +21,10 @@ SHARED Status modes_departures(Solver *s, double span, double drift);
  * force that has turned round. */
 SHARED Status modes_contradicted(Solver *s);
 
-/* landing.c: contacts that an importer's solver has carried inside (f < 0), the open ones and those flagged in
+/* landing.c: what is inside open contacts, since closed ones went with a motion that was prescribed anew, goes out. */
+SHARED Status landing_push_out(Solver *s);
+
+/* Contacts that an importer's solver has carried inside (f < 0), the open ones and those flagged in
  * `happened`, go back to f = 0 together.  `pull` (contacts): the acceleration towards each of them. */
 SHARED Status landing_bring_back(Solver *s, const int *happened, const double *pull);
 

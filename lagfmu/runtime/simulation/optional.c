@@ -12,6 +12,7 @@ SHARED_VALUE const Optional OPTIONAL = {
     .events_find = events_find,
     .contacts_modes = contacts_modes,
     .impact_check = impact_check,
+    .landing_push_out = landing_push_out,
     .landing_bring_back = landing_bring_back,
     .modes_switch = modes_switch,
     .modes_departures = modes_departures,

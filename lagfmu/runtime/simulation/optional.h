@@ -31,6 +31,7 @@ typedef struct {
     Status (*contacts_modes)(Solver *s, Instant at, const double *q, const double *v, int *closed,
                              const int *touching, const int *departing);
     Status (*impact_check)(Solver *s);
+    Status (*landing_push_out)(Solver *s);
     Status (*landing_bring_back)(Solver *s, const int *happened, const double *pull);
     Status (*modes_switch)(Solver *s, const int *happened);
     Status (*modes_departures)(Solver *s, double span, double drift);
