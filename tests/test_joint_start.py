@@ -110,6 +110,21 @@ def test_any_joint_takes_the_rest_along(native_fmu: Fmu) -> None:
     assert found["angle.A"] == pytest.approx(pi / 4, rel=1e-14)
 
 
+@pytest.mark.parametrize("ride", [0.01, 0.05, 0.33])
+def test_a_wheel_on_its_road_follows(native_fmu: Fmu, ride: float) -> None:
+    """A car that its joint lifts stands as one whose height is given: while its wheel reaches the post it
+    stays there.  A roll that the joint does not allow is let go, and leaves no speed behind."""
+    fmu = native_fmu("DoubleWishbone")
+    found = first(fmu, {"position.ride": ride, "car.omega.x": -0.058})
+    assert found["position.ride"] == pytest.approx(ride, rel=1e-13)
+    assert abs(found["car.omega.x"]) < 1e-20
+    assert abs(found["der(car.position.z)"]) < 1e-3
+    if ride < 0.3:
+        height = first(fmu, {"car.position.z": 0.5 + ride})
+        for name in ("upright.position.z", "angle.A", "der(upright.position.z,2)"):
+            assert found[name] == pytest.approx(height[name], rel=1e-9), name
+
+
 @pytest.mark.parametrize(
     ("start", "named", "nearest"),
     [

@@ -76,7 +76,8 @@ static Status find_joint_rates(Solver *s, const int *rows) {
     return FAILED;
 }
 
-/* Values or rates from where the coordinates alone begin, by the first level at which they are reached. */
+/* Values or rates from those of the state, by the first level at which they are reached; with the contacts in place that
+ * are closed in it. */
 static void find_joints(Solver *s, int of_rates) {
     struct JointSearch *x = s->joint_search;
     const System *of = s->system;
@@ -90,10 +91,9 @@ static void find_joints(Solver *s, int of_rates) {
         else
             priority_moves(of, x->priority, x->held);
         for (int i = 0; i < of->nv; i++) x->held[i] = (int)x->held[i] >= HELD_OTHERS[level] ? SET : OMITTED;
-        memset(s->state.closed, 0, (size_t)of->contacts * sizeof *s->state.closed);
         system_active(of, s->state.closed, rows);
         if (of_rates)
-            memcpy(x->v, x->asked + of->nq, (size_t)of->nv * sizeof *x->v);
+            memcpy(x->v, s->state.v, (size_t)of->nv * sizeof *x->v);
         else
             memcpy(x->q, s->state.q, (size_t)of->nq * sizeof *x->q);
         for (int k = 0; k < of->m; k++) rows[k] &= of_rates || of->rows[k].kind != NONHOLONOMIC;
@@ -171,6 +171,25 @@ static Status check_joints(Solver *s, Moved moved, void *context) {
     return FAILED;
 }
 
+/* A start whose values are x->q and whose rates are v (nv). */
+static Status start_at(Solver *s, const double *v) {
+    struct JointSearch *x = s->joint_search;
+    return solver_start(s, x->at.t, x->q, v, x->priority, NULL, NULL);
+}
+
+/* Values, then rates; where contacts may open they are left aside, otherwise those stay that the latest start closed. */
+static Status find_joint_start(Solver *s, int may_open) {
+    struct JointSearch *x = s->joint_search;
+    const size_t contacts = (size_t)s->system->contacts * sizeof *s->state.closed;
+    if (may_open) memset(s->state.closed, 0, contacts);
+    find_joints(s, 0);
+    if (start_at(s, x->asked + s->system->nq) != OK) return FAILED;
+    if (may_open) memset(s->state.closed, 0, contacts);
+    find_joints(s, 1);
+    if (start_at(s, x->v) != OK) return FAILED;
+    return check_joints(s, NULL, NULL);
+}
+
 static Status start_by_joints(Solver *s, double t, const double *begin, const Priority *priority, Moved moved,
                               void *context) {
     struct JointSearch *x = s->joint_search;
@@ -180,9 +199,7 @@ static Status start_by_joints(Solver *s, double t, const double *begin, const Pr
     if (solver_start(s, t, begin, v0, priority, NULL, NULL) != OK) return FAILED;
     x->at = segment_instant(s, t);
     begin_without_joints(s);
-    for (int of_rates = 0; of_rates < 2; of_rates++) find_joints(s, of_rates);
-    if (solver_start(s, t, x->q, x->v, x->priority, NULL, NULL) != OK) return FAILED;
-    if (check_joints(s, NULL, NULL) != OK) return FAILED;
+    if (find_joint_start(s, 1) != OK && (s->system->contacts == 0 || find_joint_start(s, 0) != OK)) return FAILED;
     if (moved == NULL) return OK;
     const Start from = {s, x->at, x->asked, x->asked + nq, x->priority, s->moves, x->priority + nq};
     initial_moved(&from, moved, context);
