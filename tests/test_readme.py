@@ -59,8 +59,8 @@ TRIED_ELSEWHERE = (
     "optuna",
     "gemseo_fmu",
 )  # with FMUs, as printed
-# studies: tried in tests of their own
-LONG = ("tradeoff", "stress", "sweep", "sensitivity", "fit", "report", "page")
+# studies, and what writes files that are there already: tried in tests of their own
+LONG = ("new", "tradeoff", "stress", "sweep", "sensitivity", "fit", "report", "page")
 
 
 def quick(command: list[str]) -> bool:
