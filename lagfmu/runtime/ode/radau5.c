@@ -14,9 +14,8 @@
  * radau5). Step sizes: Gustafsson's predictive controller (eq. IV.8.25).  Dense output: p, of order
  * 3. J is evaluated at each step, so that nothing but the last polynomial is remembered.
  *
- * Blocks behind the state (columns of derivatives, S' = J S + ...) are solved for with the state's factors, in its
- * iterations and, where these are too few for them, in further ones that leave the state as it is: a step of S is
- * the derivative of the step of y, and that is what it is without them. */
+ * Blocks behind the state (columns of derivatives, S' = J S + ...) are solved for with the state's factors in the
+ * state's iterations, which do not look at them: an iterate of S is the derivative of that of y. */
 #include "lu.h"
 #include "step_size.h"
 
@@ -42,8 +41,7 @@ static const double P[3][3] = {
 static const double RADAU_SAFETY = 0.9, RADAU_LEAST_FACTOR = 1.0 / 5, RADAU_LARGEST_FACTOR = 8;
 static const double LEAST_ERROR = 1e-2; /* that the predictive controller remembers */
 enum {
-    NEWTON_ITERATIONS = 7, /* of Newton's method, at most */
-    BLOCK_ITERATIONS = 50  /* the same of blocks behind the state, which are linear */
+    NEWTON_ITERATIONS = 7 /* of Newton's method, at most */
 };
 
 /* Where things lie in the scratch. */
@@ -144,50 +142,18 @@ static double weighted_mean(int n, int stages, int apart, const double *x, const
     return sqrt(sum / (stages * n));
 }
 
-/* Newton's correction of the blocks from `first` on, in x.r. */
-static void correct_blocks(const Integrator *i, Work x, int first) {
+/* Newton's correction of the state and the blocks behind it, in x.r. */
+static void correct_blocks(const Integrator *i, Work x) {
     const int n = i->watched, all = i->ny;
-    for (int from = first * n; from < all; from += n) {
+    for (int from = 0; from < all; from += n) {
         lu_solve(n, x.real, x.pivots, x.r + from);
         lu_solve_complex(n, x.re, x.im, x.pivots_complex, x.r + all + from, x.r + 2 * all + from);
     }
 }
 
-/* The largest correction of a block, in parts of the tolerance of its own size: that of its largest component. */
-static double left_of_blocks(const Integrator *i, Work x, double tolerance) {
-    const int n = i->watched;
-    double most = 0;
-    for (int from = n; from < i->ny; from += n) {
-        double size = 0;
-        for (int j = 0; j < n; j++)
-            size = fmax(size, fabs(i->y[from + j] + x.z[2 * i->ny + from + j]) / x.weight[j] * tolerance);
-        if (size > 0) most = fmax(most, weighted_mean(n, 3, i->ny, x.r + from, x.weight) / size);
-    }
-    return most;
-}
-
-/* The blocks for stages of the state that stay; what does not settle is no number. */
-static void settle_blocks(const Integrator *i, const Ode *ode, Work x, const Trial *trial, double enough,
-                          double tolerance) {
-    const int n = i->watched, all = i->ny;
-    double left = left_of_blocks(i, x, tolerance);
-    for (int count = 0; left > enough && count < BLOCK_ITERATIONS; count++) {
-        if (stage_residual(i, ode, x, trial) != OK) break;
-        correct_blocks(i, x, 1);
-        for (int k = 0; k < 3; k++)
-            for (int j = n; j < all; j++) x.w[k * all + j] += x.r[k * all + j];
-        for (int j = n; j < all; j++)
-            for (int k = 0; k < 3; k++)
-                x.z[k * all + j] = T[k][0] * x.w[j] + T[k][1] * x.w[all + j] + T[k][2] * x.w[2 * all + j];
-        left = left_of_blocks(i, x, tolerance);
-    }
-    for (int j = n; j < all && left > enough; j++) x.z[2 * all + j] = NAN;
-}
-
 /* Solves for Z to a part `enough` of the tolerance.  The iterations that it took; 0: it diverges,
  * is too slow, or a stage cannot be evaluated. */
-static int newton_on_stages(const Integrator *i, const Ode *ode, Work x, Trial *trial, double enough,
-                            double tolerance) {
+static int newton_on_stages(const Integrator *i, const Ode *ode, Work x, Trial *trial, double enough) {
     const int n = i->watched, all = i->ny;
     double before = 0, theta = 0, eta = 1;
     for (int count = 1; count <= NEWTON_ITERATIONS; count++) {
@@ -195,7 +161,7 @@ static int newton_on_stages(const Integrator *i, const Ode *ode, Work x, Trial *
             trial->unevaluated = 1;
             return 0;
         }
-        correct_blocks(i, x, 0);
+        correct_blocks(i, x);
         double size = weighted_mean(n, 3, all, x.r, x.weight);
         if (!isfinite(size)) return 0;
         if (count > 1) {
@@ -209,10 +175,7 @@ static int newton_on_stages(const Integrator *i, const Ode *ode, Work x, Trial *
         }
         for (int j = 0; j < 3 * all; j++) x.w[j] += x.r[j];
         combine(all, T, x.w, x.z);
-        if (eta * size <= enough) {
-            if (all > n) settle_blocks(i, ode, x, trial, enough, tolerance);
-            return count;
-        }
+        if (eta * size <= enough) return count;
         before = size;
     }
     return 0;
@@ -292,7 +255,7 @@ static Status radau5_step(Integrator *i, const Ode *ode, const Control *control,
         predict(i, x, trial.h);
         for (int j = 0; j < n; j++)
             x.weight[j] = step_size_weight(tolerance, i->y[j], i->y[j], control->scale[j]);
-        if (factor_matrices(n, x, trial.h)) count = newton_on_stages(i, ode, x, &trial, enough, tolerance);
+        if (factor_matrices(n, x, trial.h)) count = newton_on_stages(i, ode, x, &trial, enough);
         if (count > 0) {
             int first = trial.rejected > 0 || !(i->error_old > 0);
             double error =
