@@ -151,10 +151,10 @@ class _Moving:
         self.scale = np.ones(len(self.lengths))  # what is much of each speed, in a second
         rates = [model.kinematics.get(q, q.diff(TIME)) for q in model.coordinates]
         self._moved = Rows(model, [(sp.S.Zero, rate) for rate in rates])
-        names = list(model.coordinates)
-        heads = [j for j, q in enumerate(names) if name_of(q).endswith(".orientation.w")]
+        places = {q: j for j, q in enumerate(model.coordinates)}
+        heads = [j for q, j in places.items() if name_of(q).endswith(".orientation.w")]
         self._quaternions = [slice(j, j + 4) for j in heads]
-        self._angles = {names.index(q): name_of(q) for q in model.unwrapped}
+        self._angles = {places[q]: name_of(q) for q in model.unwrapped}
         self._turned = Rows(model, [(angle, sp.S.Zero) for angle in model.unwrapped.values()])
 
     def sized(self, q: Array) -> float:

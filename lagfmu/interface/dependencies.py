@@ -165,7 +165,7 @@ class Dependencies:
 def one_of(found: Names, groups: Collection[Names]) -> Names:
     """What is found with these groups; one of them itself if it holds all the others."""
     largest = max(groups, key=len, default=found)
-    if all(part <= largest for part in (found, *groups)):
+    if all(part is largest or part <= largest for part in (found, *groups)):
         return largest
     return found.union(*groups)
 

@@ -99,8 +99,9 @@ class Outputs:
             of_one = self._of_coordinate(q, v, symbols)
             stepped = str(q) in self.behind.states
             variables += of_one if stepped or not eom.bare else of_one[:2]
+        known = set(eom.q)
         for q, v in zip(self.stepped.q, self.stepped.v, strict=True):
-            if q not in eom.q:
+            if q not in known:
                 variables += self._of_coordinate(q, v, of_stepped)
         return sorted(variables, key=self._place) if eom.bare else variables
 
@@ -185,9 +186,11 @@ class Outputs:
 
     def _place(self, v: Variable) -> int:
         """Where the coordinate stands in the model; those of an embedding come last."""
-        order = [str(self.eom.symbols[c]) for c in self.model.coordinates]
-        q = v.of.coordinate
-        return order.index(q) if q in order else len(order)
+        return self._order.get(v.of.coordinate, len(self._order))
+
+    @cached_property
+    def _order(self) -> dict[str, int]:
+        return {str(self.eom.symbols[c]): k for k, c in enumerate(self.model.coordinates)}
 
     def constraints(self) -> list[Variable]:
         """Of each its multiplier, its residual, whether the multiplier is unique; generalized forces."""
@@ -246,7 +249,7 @@ class Outputs:
         solved |= {s: behind.group(row=k) for k, s in enumerate(self.eom.lam)}
         for o in self.eom.outputs:
             found = symbols_of(o)
-            own = behind.symbols(*(found - solved.keys()))
+            own = behind.symbols(*(s for s in found if s not in solved))
             symbols = one_of(own, {solved[s] for s in found & solved.keys()})
             text = o.description or f"output {o.name}"
             unit = parse_unit(o.unit, o.name)

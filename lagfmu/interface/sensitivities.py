@@ -38,7 +38,10 @@ def differentiated(
             listed(numbers), list(by), "sensitivities: the parameter or start value", problems
         )
         pairs |= {(row, column) for row in rows for column in columns}
-    return [(of[a], by[b]) for b in by for a in of if (a, b) in pairs]
+    rows_of = {name: k for k, name in enumerate(of)}
+    columns_of = {name: k for k, name in enumerate(by)}
+    ordered = sorted(pairs, key=lambda pair: (columns_of[pair[1]], rows_of[pair[0]]))
+    return [(of[a], by[b]) for a, b in ordered]
 
 
 def named(asked: Sequence[str]) -> set[str]:

@@ -98,7 +98,7 @@ class VariableTable:
         """
         if names.DISSIPATED in self.states and names.DISSIPATED not in outputs:
             return self.without(names.DISSIPATED, names.DISSIPATION).keeping(outputs)
-        moving = {*self.states, *self.derivatives}
+        moving, outputs = {*self.states, *self.derivatives}, set(outputs)
         kept = []
         for v in self.variables:
             if v.causality == "output" and v.name not in outputs:

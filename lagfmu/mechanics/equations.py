@@ -16,6 +16,7 @@ from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from operator import itemgetter
 
 import sympy as sp
 from sympy.physics.vector import dynamicsymbols
@@ -416,14 +417,15 @@ def derive(model: Model) -> EquationsOfMotion:
 
     energy = model.energy_expression.xreplace(table).xreplace(closed.symbols)
     M, F = _left_hand_side(list(_terms(energy)), _opened(moving, qdot), clock, problems)
+    directions = {s: i for i, s in enumerate(model.directions)}
     for direction, force in model.forces.items():
-        F[model.directions.index(direction)] += sp.sympify(force).xreplace(table)
+        F[directions[direction]] += sp.sympify(force).xreplace(table)
 
     G: dict[tuple[int, int], Expr] = {}
     nu: list[Expr] = []
     gamma: list[Expr] = []
     f: list[Expr | None] = []
-    slopes = {s: Differential({s: sp.S.One}) for s in v}
+    slopes = {s: (j, Differential({s: sp.S.One})) for j, s in enumerate(v)}
     opened = {s: a for a, s in closed.symbols.items()}
     along = Differential({**clock.rates, TIME: sp.S.One}) if closed.symbols else None
     twice = Differential({**clock.rates, **closed.carried, TIME: sp.S.One})
@@ -435,15 +437,15 @@ def derive(model: Model) -> EquationsOfMotion:
         f.append(expression if holonomic else None)
         if isinstance(constraint, Tie):
             rate, bend = (e.xreplace(table) for e in constraint.rates)
-            row, drift = _pfaffian(constraint, rate, v, problems, slopes)
+            row, drift = _pfaffian(constraint, rate, problems, slopes)
         elif along:  # by factors as they stand: products of sums stay short
             rate = along(expression) if holonomic else expression
-            row, drift = _pfaffian(constraint, rate.xreplace(opened), v, problems, slopes)
+            row, drift = _pfaffian(constraint, rate.xreplace(opened), problems, slopes)
             bend = along(twice(expression) if holonomic else rate)
         elif holonomic:
             row, drift = _along(expression, moving), moving.along_time(expression)
         else:
-            row, drift = _pfaffian(constraint, expression, v, problems, slopes)
+            row, drift = _pfaffian(constraint, expression, problems, slopes)
         G.update({(k, j): a for j, a in row.items()})
         nu.append(-drift)
         # d/dt (sum_j a_j v_j + drift) = sum_j a_j vdot_j - gamma
@@ -557,23 +559,18 @@ def _terms(expression: Expr) -> Iterator[Expr]:
             yield e
 
 
-def _gradient(expression: Expr, symbols: tuple[Expr, ...]) -> Iterator[tuple[int, Expr]]:
-    """(index, derivative) for the symbols that occur in the expression."""
-    present = expression.free_symbols
-    if len(present) < len(symbols):
-        index = {s: j for j, s in enumerate(symbols) if s in present}
-    else:
-        index = {s: j for j, s in enumerate(symbols)}
-    for s, j in index.items():
+def _gradient(expression: Expr, place: Mapping[Expr, int]) -> Iterator[tuple[int, Expr]]:
+    """(place, derivative) for the symbols that occur in the expression, by their places."""
+    for s in sorted(expression.free_symbols & place.keys(), key=place.__getitem__):
         d = expression.diff(s)
         if d != 0:
-            yield j, d
+            yield place[s], d
 
 
 def _along(expression: Expr, moving: Kinematics) -> dict[int, Expr]:
     """Its derivative along each speed that moves it: sum_j d/dq_j B_ji."""
     found: dict[int, list[Expr]] = defaultdict(list)
-    for j, slope in _gradient(expression, moving.q):
+    for j, slope in _gradient(expression, moving.place):
         for i, a in moving.rows[j].items():
             found[i].append(slope * a)
     along = {i: sp.Add(*parts) for i, parts in sorted(found.items())}
@@ -613,15 +610,17 @@ def _left_hand_side(
 def _pfaffian(
     constraint: Constraint,
     expression: Expr,
-    v: tuple[Expr, ...],
     problems: list[str],
-    slopes: Mapping[Expr, Differential],
+    slopes: Mapping[Expr, tuple[int, Differential]],
 ) -> tuple[dict[int, Expr], Expr]:
-    """Coefficients a_j and a_0 of sum_j a_j v_j + a_0; `slopes`: the derivative by each speed."""
-    present = expression.free_symbols
-    found = {j: slopes[s](expression) for j, s in enumerate(v) if s in present}
+    """Coefficients a_j and a_0 of sum_j a_j v_j + a_0; `slopes`: the place j of each speed, and the
+    derivative by it."""
+    present = expression.free_symbols & slopes.keys()
+    found = {
+        j: slope(expression) for j, slope in sorted((slopes[s] for s in present), key=itemgetter(0))
+    }
     row = {j: a for j, a in found.items() if a != 0}
-    nonlinear = [a for a in row.values() if a.free_symbols & set(v)]
+    nonlinear = [a for a in row.values() if a.free_symbols & slopes.keys()]
     if nonlinear:
         problems.append(
             f"constraint {constraint.name!r}: {expression} is nonlinear in the velocities, expected "
@@ -632,7 +631,7 @@ def _pfaffian(
             f"constraint {constraint.name!r}: {expression} holds no velocity; a relation between "
             "coordinates is Holonomic"
         )
-    drift = expression.xreplace(dict.fromkeys(v, sp.S.Zero))
+    drift = expression.xreplace(dict.fromkeys(present, sp.S.Zero))
     return row, drift
 
 

@@ -50,6 +50,11 @@ class Kinematics:
         return replace(self, q=q, rates=rates, unwrapped=self.unwrapped | follow)
 
     @cached_property
+    def place(self) -> dict[Expr, int]:
+        """Of each coordinate."""
+        return {s: j for j, s in enumerate(self.q)}
+
+    @cached_property
     def B(self) -> dict[tuple[int, int], Expr]:
         """The non-zeros of B (nq, nv)."""
         place = {s: i for i, s in enumerate(self.v)}

@@ -317,4 +317,5 @@ def entanglements(eom: EquationsOfMotion, formulation: str) -> list[str]:
 
 
 def _constant_mass(eom: EquationsOfMotion) -> bool:
-    return all(e.free_symbols <= set(eom.p) for e in eom.M.todok().values())
+    parameters = set(eom.p)
+    return all(e.free_symbols <= parameters for e in eom.M.todok().values())
