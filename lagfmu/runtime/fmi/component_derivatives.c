@@ -78,7 +78,7 @@ int component_directional(Component *c, const Call *call, const Group *group, co
         if (change == NULL) return CALL_ERROR;
         *change += seed[k];
     }
-    if (instance_observe(&c->instance) != OK) return component_no_value(c);
+    if (instance_observe_unique(&c->instance) != OK) return component_no_value(c);
     settle_direction(&c->instance, d.dt);
     if (instance_differentiate(&c->instance, d) != OK) return component_no_value(c);
     for (size_t k = 0; k < unknown_count; k++) {

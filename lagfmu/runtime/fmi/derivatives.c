@@ -142,6 +142,7 @@ static Status derive(Instance *x) {
 static Status change_of_peaked(Solver *s, int c, double *changes) {
     Instance *x = s->caller;
     Direction d;
+    x->seen.asked = 1;
     if (solver_observe(s, &x->seen) != OK) return FAILED;
     x->observed = 1; /* of this state, until it has been differentiated */
     Status status = c < 0 ? instance_rates(x, &d) : instance_factor(x);
@@ -178,7 +179,7 @@ static void prepare_peaks(Instance *x) {
 static Status get_derivative(Instance *x, const Variable *v, double *value) {
     struct Derived *all = x->derived;
     *value = 0;
-    if (!x->observed && instance_observe(x) != OK) return FAILED;
+    if (instance_observe_unique(x) != OK) return FAILED;
     if (!*x->solver.state.varied) return OK;
     if (v->place == AT_SENSITIVITY_VALID) {
         *value = 1;

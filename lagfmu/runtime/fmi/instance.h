@@ -122,6 +122,7 @@ SHARED Status instance_start_again(Instance *x, int state, double part);
 
 /* What can be read at the state, unless it is known already. */
 SHARED Status instance_observe(Instance *x);
+SHARED Status instance_observe_unique(Instance *x); /* from now on with which outputs are unique */
 
 /* To t_end [s].  FAILED: everything is as it was before. */
 SHARED Status instance_step(Instance *x, double t_end);

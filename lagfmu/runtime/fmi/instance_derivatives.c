@@ -14,7 +14,7 @@ Status instance_factor(Instance *x) {
     Instant *at = &x->at;
     if (s->system->tangent == NULL || (s->system->frictions > 0 && s->sensitivity.slide == NULL))
         return fail(&s->why, "this FMU was built for a scene without derivatives of its outputs");
-    if (instance_observe(x) != OK) return FAILED;
+    if (instance_observe_unique(x) != OK) return FAILED;
     *at = segment_instant(s, s->state.now.t);
     segment_begin(s);
     if (segment_motion_near(s, *at, s->state.q, s->state.v) != OK) return FAILED;
@@ -96,7 +96,7 @@ Status instance_rates(Instance *x, Direction *d) {
     Solver *s = &x->solver;
     const System *system = s->system;
     Sensitivity *w = &s->sensitivity;
-    if (instance_observe(x) != OK) return FAILED;
+    if (instance_observe_unique(x) != OK) return FAILED;
     const double *vdot = system->full == NULL ? x->seen.vdot : x->seen.sddot;
     memcpy(w->dq, system->kinematics == NULL ? s->state.v : x->seen.rate, (size_t)system->nq * sizeof *w->dq);
     memcpy(w->dv, vdot, (size_t)system->nv * sizeof *w->dv);

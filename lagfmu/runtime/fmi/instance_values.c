@@ -38,6 +38,12 @@ Status instance_observe(Instance *x) {
     return OK;
 }
 
+Status instance_observe_unique(Instance *x) {
+    if (!x->seen.asked) x->observed = 0;
+    x->seen.asked = 1;
+    return instance_observe(x);
+}
+
 /* What lies ready of an event; 0 if it is a state by the coordinates of an embedding. */
 static int ready_of_event(const Solver *s, const Variable *v, double *value) {
     const Latest *latest = &s->state.latest[event_kind(v->place)];
@@ -149,6 +155,7 @@ Status instance_get(Instance *x, const Variable *v, double *value) {
     if (estimated && instance_was_set(x, v, value)) return OK;
     if (x->started && ready(&x->solver, v, value))
         return isfinite(*value) ? OK : fail(&x->solver.why, "%s is not finite", v->name);
+    if (v->place == AT_OUTPUT_UNIQUE && instance_observe_unique(x) != OK) return FAILED;
     if (!x->observed && instance_observe(x) != OK) return FAILED;
     return instance_value(&x->solver, &x->seen, v, value);
 }

@@ -220,6 +220,6 @@ Status solver_observe(Solver *s, Observed *o) {
     if (full->energies != NULL) full->energies(at.t, o->q, o->v, at.u, at.p, o->energy);
     for (int k = 0; k < EVENT_KINDS && s->system->embed != NULL; k++) observe_events(s, (EventKind)k, o);
     if (check_observed_finite(s, full, o) != OK || outputs_observe(full, at, o, &s->why) != OK) return FAILED;
-    if (full->unique_count > 0) outputs_unique(b, at, o);
+    if (full->unique_count > 0 && o->asked) outputs_unique(b, at, o);
     return OK;
 }

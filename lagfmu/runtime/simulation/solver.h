@@ -23,6 +23,7 @@ typedef struct {
     double energy[2];              /* kinetic, potential */
     double *own, *other;           /* (output_count) the model's own; where these are not finite */
     int *own_unique;               /* (unique_count), with */
+    int asked;                     /* 1: own_unique is wanted, a solve for each */
     double *work_unique;           /* (outputs_unique_doubles()) */
     double *s, *sdot, *sddot;      /* (nq of the stepped system) of an embedding */
     double *latest_q[EVENT_KINDS], *latest_v[EVENT_KINDS]; /* of an embedding: state.latest in full coordinates */
