@@ -19,7 +19,7 @@ from sympy import symbols
 from sympy.physics.mechanics import dynamicsymbols
 from typer.testing import CliRunner
 
-from lagfmu import Contact, Model, Parameter, Scene, fit
+from lagfmu import Contact, Holonomic, Model, Parameter, Scene, fit
 from lagfmu.errors import BuildError, RequestError
 from lagfmu.testing import app, prepare
 
@@ -149,6 +149,40 @@ def test_a_stiff_damper_by_the_implicit_method(built):
     for by, change in slower.items():
         moved = expected * (change * found["time"] + (by == "x0") / 0.5)
         np.testing.assert_allclose(found[f"sensitivity.x.by.{by}"], moved, rtol=1e-6, atol=1e-12)
+
+
+def test_where_a_reduced_disk_strikes_follows_its_radius(built):
+    """A disk that rolls, y = R theta by theta alone, strikes a wall at y = b: there y knows no radius, and
+    theta = b/R goes with -b/R^2."""
+    y, theta = dynamicsymbols("y theta")
+    M, R, F, b = symbols("M R F b", positive=True)
+    model = Model(
+        name="Struck",
+        lagrangian=M * y.diff() ** 2 / 2 + M * R**2 * theta.diff() ** 2 / 4,
+        forces={y: F},
+        coordinates={y: "m", theta: "rad"},
+        constraints=[
+            Holonomic("rolling", y - R * theta),
+            Contact("wall", b - y, restitution=0.5),
+        ],
+        parameters=[
+            Parameter(M, 1.0, "kg"),
+            Parameter(R, 0.1, "m"),
+            Parameter(F, 2.0, "N"),
+            Parameter(b, 0.3, "m"),
+        ],
+        start={y: 0.0, theta: 0.0},
+    )
+    asked = ("closing.wall.y:R,b", "closing.wall.theta:R,b", "closing.wall.velocity.theta:R")
+    found = run(built(model, Scene("Struck", formulation="minimal", sensitivities=asked)), 1.0, 4)[
+        -1
+    ]
+    assert found["closing.wall.count"] >= 1
+    assert found["closing.wall.y"] == pytest.approx(0.3)
+    expected = {"y.by.R": 0.0, "y.by.b": 1.0, "theta.by.R": -0.3 / 0.1**2, "theta.by.b": 1 / 0.1}
+    expected["velocity.theta.by.R"] = -found["closing.wall.velocity.theta"] / 0.1
+    for name, value in expected.items():
+        assert found[f"sensitivity.closing.wall.{name}"] == pytest.approx(value, abs=1e-8), name
 
 
 # ------------------------------------------------------------------------------- contacts

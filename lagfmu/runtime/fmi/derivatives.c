@@ -75,17 +75,20 @@ static void forget(Instance *x) { x->derived->done = 0; }
 /* ------------------------------------------------------------------ values */
 
 /* Of the state at an event, by the coordinates of an embedding. */
-static double at_event(Instance *x, const Variable *of, const double *column) {
+static double at_event(Instance *x, const Variable *of, int c) {
     Solver *s = &x->solver;
+    Sensitivity *w = &s->sensitivity;
     const System *system = s->system;
     const EventKind kind = event_kind(of->place);
     const Latest *latest = &s->state.latest[kind];
-    const int nq = system->nq, i = of->contact;
-    const double *change = column + column_of_event(system, kind, i);
+    const int nq = system->nq, i = of->contact, parameter = s->column[c].parameter;
+    const double *change = column_at(s, c) + column_of_event(system, kind, i);
     struct Derived *d = x->derived;
-    memset(s->sensitivity.du, 0, (size_t)system->inputs * sizeof *s->sensitivity.du);
+    memset(w->du, 0, (size_t)system->inputs * sizeof *w->du);
+    if (parameter >= 0) w->dp[parameter] = 1;
     system->embed_tangent(latest->time[i], latest->q + i * nq, latest->v + i * nq, s->u, s->p, change[0], change + 1,
-                          change + 1 + nq, s->sensitivity.du, s->sensitivity.dp, d->q, d->v);
+                          change + 1 + nq, w->du, w->dp, d->q, d->v);
+    if (parameter >= 0) w->dp[parameter] = 0;
     return event_part(of->place) == AT_DEPARTURE_Q ? d->q[of->index] : d->v[of->index];
 }
 
@@ -100,7 +103,7 @@ static double remembered(Instance *x, const Variable *of, int c) {
     if (event_part(of->place) == AT_DEPARTURE_TIME) return change[0];
     if (system->full == NULL)
         return change[1 + (event_part(of->place) == AT_DEPARTURE_V ? system->nq : 0) + of->index];
-    return x->solver.state.latest[event_kind(of->place)].count[of->contact] > 0 ? at_event(x, of, column) : 0;
+    return x->solver.state.latest[event_kind(of->place)].count[of->contact] > 0 ? at_event(x, of, c) : 0;
 }
 
 /* Everything along a column. */
