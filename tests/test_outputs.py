@@ -180,6 +180,25 @@ def test_a_model_whose_output_has_no_value_at_its_start_is_refused(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+def test_an_output_of_many_coordinates_reads_those_that_it_holds():
+    """The middle of two balls is as long an expression among 30 balls as among 3: code for n bodies that each
+    tell something of their own grows with n."""
+
+    def code(n: int) -> str:
+        places = dynamicsymbols(f"x1:{n + 1}")
+        model = Model(
+            "Balls",
+            lagrangian=sum(m * p.diff() ** 2 / 2 for p in places),
+            coordinates=dict.fromkeys(places, "m"),
+            parameters=CONSTANTS[:1],
+            outputs=[Output("middle", (places[0] + places[2]) / 2, "m")],
+        )
+        text = prepare(model).text
+        return text[text.index("def output_0(") :].partition("\n\n")[0]
+
+    assert code(30) == code(3)
+
+
 def test_what_an_output_depends_on_is_told(prepared):
     """The power F s' depends on F and s' at an instant; the tension on all that moves, and on F."""
     table = prepared("CartPendulum").table

@@ -1,0 +1,184 @@
+"""Movements of a mechanism that are least in the metric of M, and the coordinates to which they lead.
+
+Newton's method, damped by halving,
+
+    minimize  d^T M d   with   f(q) + f_q d = 0 .
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import sympy as sp
+from scipy.sparse import csr_array, diags_array, hstack, vstack
+
+from ..model.elements import name_of
+from ..model.model import Model
+from ..numeric.linear import divided, factor, norms, row_sizes
+from ..numeric.system import Sparse
+from .branches import CLOSED
+from .draft import Draft
+from .rows import TIME, Array, Rows, numbers_of
+
+STEPS, HALVINGS = 100, 12
+TRIES = 12  # beginnings with other omitted values, where the first leads nowhere
+LIGHT = 1e-6  # what resists a parameter of a curve, which has no mass, of that of the body
+REDUNDANT = 1e-11  # a singular value, relative to the largest: rows that say the same
+DENSE = 200  # speeds up to which dense algebra is as quick
+YIELDING, YIELDS = 1e-5, 10  # of a row: its slack; how often at most what is left is done
+EPS = float(np.finfo(float).eps)
+
+
+def moving_of(draft: Draft, model: Model) -> Moving:
+    """Of a mechanism with many speeds by sparse algebra."""
+    return (Moving if len(model.directions) <= DENSE else _MovingMuch)(draft, model)
+
+
+class Moving:
+    """Movements d (n_v) of a mechanism that are least in d^T W^2 d, and what they do to its coordinates."""
+
+    def __init__(self, draft: Draft, model: Model) -> None:
+        masses = {
+            d: m
+            for b in draft.motions.values()
+            for d, m in zip(b.directions, b.masses, strict=True)
+        } | {s: LIGHT * of.mass for s, of in draft.curves.items()}
+        self.weight = np.sqrt(numbers_of(model, [masses[d] for d in model.directions]))
+        self.lengths = np.array([model.coordinates.get(d) == "m" for d in model.directions])
+        self.scale = np.ones(len(self.lengths))  # what is much of each speed, in a second
+        rates = [model.kinematics.get(q, q.diff(TIME)) for q in model.coordinates]
+        self._moved = Rows(model, [(sp.S.Zero, rate) for rate in rates])
+        places = {q: j for j, q in enumerate(model.coordinates)}
+        heads = [j for q, j in places.items() if name_of(q).endswith(".orientation.w")]
+        self._quaternions = [slice(j, j + 4) for j in heads]
+        self._angles = {places[q]: name_of(q) for q in model.unwrapped}
+        self._turned = Rows(model, [(angle, sp.S.Zero) for angle in model.unwrapped.values()])
+
+    def sized(self, q: Array) -> float:
+        """The size of the mechanism at q [m], by which its lengths are judged from now on."""
+        straight = np.abs(self._slopes([self._moved], q)) @ self.lengths > 0
+        size = float(np.abs(q[straight]).max(initial=0.0)) or 1.0
+        self.scale = np.where(self.lengths, size, 1.0)
+        return size
+
+    def tied(self, q: Array, near: Mapping[str, float] | None = None) -> Array:
+        """q with unit quaternions, and with each angle that goes on over turns at its attitude, nearest to
+        where it was, or to a value that is given."""
+        q = q.copy()
+        for place in self._quaternions:
+            q[place] /= np.linalg.norm(q[place])
+        for (j, name), angle in zip(self._angles.items(), self._turned.values(q), strict=True):
+            before = q[j] if near is None else near.get(name, q[j])
+            q[j] = angle + 2 * np.pi * np.round((before - angle) / (2 * np.pi))
+        return q
+
+    def moved(self, q: Array, d: Array) -> Array:
+        """The coordinates after a movement."""
+        return self.tied(q + self._slopes([self._moved], q) @ d)
+
+    def closed(self, rows: Sequence[Rows], wanted: Array, rough: Array) -> tuple[Array, Array]:
+        """Coordinates at which the rows have the wanted values, and what each misses, relative to its size.
+
+        A beginning from which Newton's method comes to rest elsewhere, as where all links lie on a line, is
+        left for others about it.
+        """
+        draws = np.random.default_rng(0)
+        best, least = rough, np.full(len(wanted), np.inf)
+        for k in range(TRIES):
+            away = draws.uniform(-0.5, 0.5, len(self.scale)) * self.scale
+            q, missed = self.newton(rows, wanted, self.moved(rough, away) if k else rough)
+            if missed.max(initial=0.0) < least.max(initial=0.0):
+                best, least = q, missed
+            if least.max(initial=0.0) <= CLOSED:
+                break
+        return best, least
+
+    def is_determined(self, rows: Sequence[Rows], q: Array) -> bool:
+        """True if the rows leave no motion."""
+        slopes = np.vstack([r.slopes(q) for r in rows]) / self.weight
+        return bool(np.linalg.matrix_rank(slopes) == len(self.weight))
+
+    def newton(
+        self, rows: Sequence[Rows], wanted: Array, q: Array, enough: float = 0.0
+    ) -> tuple[Array, Array]:
+        """Coordinates near q at which the rows have the wanted values, and what each misses: at most
+        `enough`, or as little as can be."""
+        r, A, size = self._missed(rows, wanted, q)
+        if not (np.isfinite(r).all() and np.isfinite(np.abs(A).sum())):
+            return q, np.full(len(r), np.inf)
+        for _ in range(STEPS):
+            if np.abs(r / size).max(initial=0.0) <= enough:
+                break
+            step = self._least(A, r, size)
+            for halved in range(HALVINGS):
+                new = self.moved(q, step * 0.5**halved)
+                after = self._missed(rows, wanted, new)
+                if np.linalg.norm(after[0] / after[2]) < np.linalg.norm(r / size):
+                    break
+            else:
+                break
+            q, (r, A, size) = new, after
+        return q, np.abs(r / size)
+
+    def _missed(self, rows: Sequence[Rows], wanted: Array, q: Array) -> tuple[Array, Any, Array]:
+        """What is missing (m), the slopes (m, n_v), and how large a change each row sees (m)."""
+        values, A = self._values_and_slopes(rows, q)
+        return wanted - values, A, self._sizes(A)
+
+    def _values_and_slopes(self, rows: Sequence[Rows], q: Array) -> tuple[Array, Any]:
+        values, slopes = zip(*(row.values_and_slopes(q) for row in rows), strict=True)
+        return np.concatenate(values), np.vstack(slopes)
+
+    def _slopes(self, rows: Sequence[Rows], q: Array) -> Any:
+        return np.vstack([row.slopes(q) for row in rows])
+
+    def _sizes(self, A: Any) -> Array:
+        size = np.abs(A * self.scale).max(axis=1, initial=0.0)
+        return np.where(size > 0, size, 1.0)
+
+    def _least(self, A: Any, r: Array, size: Array) -> Array:
+        """d with A d = r as nearly as can be, each row by its size, and least among those."""
+        A, r = A / size[:, None], r / size
+        d: Array = np.linalg.lstsq(A / self.weight, r, rcond=REDUNDANT)[0] / self.weight
+        return d
+
+    def velocities(self, rows: Sequence[Rows], wanted: Array, q: Array, v: Array) -> Array:
+        """The velocities nearest to v at which the rows have the wanted rates."""
+        A = self._slopes(rows, q)
+        missing = wanted - np.concatenate([r.drifts(q) for r in rows]) - A @ v
+        return v + self._least(A, missing, self._sizes(A))
+
+
+class _MovingMuch(Moving):
+    """Those of a mechanism with many speeds, by sparse algebra."""
+
+    def _values_and_slopes(self, rows: Sequence[Rows], q: Array) -> tuple[Array, Sparse]:
+        return np.concatenate([row.values(q) for row in rows]), self._slopes(rows, q)
+
+    def _slopes(self, rows: Sequence[Rows], q: Array) -> Sparse:
+        return vstack([row.sparse_slopes(q) for row in rows], format="csr")
+
+    def _sizes(self, A: Sparse) -> Array:
+        size = row_sizes(A.tocoo(), self.scale, np.ones(A.shape[0]))
+        return np.where(size > 0, size, 1.0)
+
+    def _least(self, A: Sparse, r: Array, size: Array) -> Array:
+        """Rows may depend on each other: each may be missed by a slack s, least in d^2 + s^2 with
+        A d + YIELDING |row| s = r, over and over for what is left (iterated Tikhonov regularization; Hansen,
+        Rank-Deficient and Discrete Ill-Posed Problems, sect. 5.1)."""
+        A, r, (m, n) = divided(A, size, self.weight), r / size, A.shape
+        slack = diags_array(YIELDING * np.maximum(norms(A), np.finfo(float).tiny))
+        one = csr_array(diags_array(np.ones(n + m)))
+        factored = factor(one, hstack([A, slack], format="csr"))
+        if factored is None:
+            return np.zeros(n)
+        d = np.zeros(n)
+        for _ in range(YIELDS):
+            more = factored.solve(np.zeros(n + m), r - A @ d)[0][:n]
+            d += more
+            if np.abs(more).max() <= EPS * np.abs(d).max():
+                break
+        found: Array = d / self.weight
+        return found
