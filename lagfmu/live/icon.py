@@ -18,7 +18,7 @@ from .view import View
 
 SIDE, DOTS = 1.28, 100  # in, and dots an inch
 # of a point: further digits of a place are seen by nobody
-HUNDREDTH = re.compile(rb"(\d+\.\d\d)\d+")
+TENTH = re.compile(rb"(\d+\.\d)\d+")
 
 
 def icon(prepared: Prepared) -> dict[str, bytes]:
@@ -63,5 +63,5 @@ def _drawn(shapes: list[Moving]) -> dict[str, bytes]:
         figure.savefig(lines, format="svg", transparent=True, metadata=untold)
     return {
         f"{ICON}.png": pixels.getvalue(),
-        f"{ICON}.svg": HUNDREDTH.sub(rb"\1", lines.getvalue()),
+        f"{ICON}.svg": TENTH.sub(rb"\1", lines.getvalue()),
     }

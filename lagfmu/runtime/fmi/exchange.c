@@ -15,7 +15,6 @@
 #include <math.h>
 #include <string.h>
 
-#include "friction.h"
 #include "indicators.h"
 #include "nominals.h"
 #include "optional.h"
@@ -113,15 +112,6 @@ Status exchange_multipliers(Instance *x) {
     return segment_motion_near(s, segment_instant(s, s->state.now.t), s->state.q, s->state.v);
 }
 
-/* What frictions dissipate [W], of the latest motion. */
-static double friction_power(const Mechanism *b) {
-    const struct FrictionForces *f = b->friction;
-    double power = 0;
-    for (int i = 0; i < 2 * b->system->frictions; i++)
-        if (!f->stick_slip[i / 2].sticks) power -= f->tangential[i] * f->slip[i];
-    return power;
-}
-
 /* Adds the accelerations that lead back onto the constraints. */
 static Status stabilize(Instance *x, double *derivatives) {
     Solver *s = &x->solver;
@@ -149,7 +139,7 @@ Status exchange_derivatives(Instance *x, double *derivatives) {
     mechanism_rates(b, s->state.v, rate);
     for (int j = 0; j < system->nq; j++) derivatives[place_of(system, j)] = rate[j];
     for (int i = 0; i < system->nv; i++) derivatives[place_of(system, system->nq + i)] = b->vdot[i];
-    if (EXCHANGE_LOST) derivatives[system_states(system)] = friction_power(b);
+    if (EXCHANGE_LOST) derivatives[system_states(system)] = OPTIONAL.friction->power(s);
     return stabilize(x, derivatives);
 }
 

@@ -15,14 +15,6 @@
 
 static const double PAINLEVE_SAFE = 1e-9; /* 1 + A below this counts as not positive */
 
-/* How a friction stands.  sign: N = sign (load + c lambda) while it slips; direction: unit vector of the
- * slip velocity where that is zero or was last known; slip velocities up to `noise` are rounding.  held: it does
- * not stick, but what does leaves it no slip, as in a mechanism that stands. */
-typedef struct {
-    int sticks, held;
-    double sign, direction[2], noise;
-} StickSlip;
-
 /* What frictions do at the state of the latest motion; two entries a friction where a row is meant, the
  * second 0 where there is only one. */
 struct FrictionForces {

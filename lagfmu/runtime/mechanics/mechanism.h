@@ -14,6 +14,14 @@
 #include <math.h>
 #include <string.h>
 
+/* How a friction stands.  sign: N = sign (load + c lambda) while it slips; direction: unit vector of the
+ * slip velocity where that is zero or was last known; slip velocities up to `noise` are rounding.  held: it does
+ * not stick, but what does leaves it no slip, as in a mechanism that stands. */
+typedef struct {
+    int sticks, held;
+    double sign, direction[2], noise;
+} StickSlip;
+
 struct FrictionForces;
 typedef struct Mechanism Mechanism;
 

@@ -179,10 +179,14 @@ static Status slip_off(Solver *s, Status (*carry)(Solver *s)) {
     return carried == OK ? renew(s) : FAILED;
 }
 
+static void attach(Solver *s) {
+    if (s->stepped.friction != NULL) s->stepped.friction->stick_slip = s->state.stick_slip;
+}
+
 SHARED_VALUE const FrictionEvents FRICTION_EVENTS = {
     .sliding = &SLIDING, .doubles = frictional_impact_doubles, .ints = frictional_impact_ints,
-    .begin = begin, .change = change, .stop = stop, .contradicted = contradicted, .renew = renew, .slip_off = slip_off,
+    .attach = attach, .begin = begin, .change = change, .stop = stop, .contradicted = contradicted, .renew = renew, .slip_off = slip_off,
     .indicators = slip_indicators, .range = slip_range,
     .turns = slip_turns, .turn = slip_turn,
-    .work = slip_work, .jacobian = slip_jacobian, .impact = frictional_impact,
+    .observe = slip_observe, .power = slip_power, .work = slip_work, .jacobian = slip_jacobian, .impact = frictional_impact,
 };

@@ -8,7 +8,6 @@
 #ifndef LAGFMU_FRICTION_EVENTS_H
 #define LAGFMU_FRICTION_EVENTS_H
 
-#include "friction.h"
 #include "impact.h"
 #include "indicators.h"
 #include "linkage.h"
@@ -17,6 +16,8 @@
 typedef struct {
     const Sliding *sliding;
     size_t (*doubles)(const System *s), (*ints)(const System *s); /* workspace of `impact` */
+    /* The mechanism reads the modes of the state. */
+    void (*attach)(Solver *s);
     /* At the start, with the contacts as they would be without frictions: all modes together. */
     Status (*begin)(Solver *s, Instant at, int *closed, const int *touching);
     /* At an event, `left` being the frictions' indicators: modes, offsets, starts of slipping. */
@@ -38,6 +39,10 @@ typedef struct {
     int (*turns)(const Solver *s);
     /* Directions of slip at the end of a step (t, y). */
     Status (*turn)(Solver *s, double t, const double *y);
+    /* What frictions do, of the latest motion. */
+    void (*observe)(const Solver *s, Observed *o);
+    /* - sum lambda_t . s [W], of the latest motion. */
+    double (*power)(const Solver *s);
     /* - int sum lambda_t . s dt [J] from t0 to t1, by the integrator's dense output. */
     Status (*work)(Solver *s, double t0, double t1, double *work);
     /* d(y')/dy and dy'/dt by differences. */

@@ -10,6 +10,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "friction.h"
 #include "friction_events.h"
 
 enum { FRICTIONAL_SWEEPS = 20000 };

@@ -59,7 +59,7 @@ void solver_layout(Solver *s, Arena *saved, Arena *scratch, const System *system
     integrator_layout(&s->probe, scratch, scratch, width, states, OPTIONAL.methods, METHOD_COUNT);
     mechanism_layout(&s->stepped, scratch, system, &s->why,
                      OPTIONAL.friction != NULL ? OPTIONAL.friction->sliding : NULL);
-    if (s->stepped.friction != NULL) s->stepped.friction->stick_slip = s->state.stick_slip;
+    if (OPTIONAL.friction != NULL) OPTIONAL.friction->attach(s);
     sensitivity_layout(&s->sensitivity, scratch, system);
     if (system->frictions > 0) s->sensitivity.slide = OPTIONAL.sliding_along;
     s->moves = arena_take(scratch, (size_t)nv, sizeof *s->moves);

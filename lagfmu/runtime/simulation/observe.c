@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "digits.h"
+#include "optional.h"
 #include "outputs.h"
 #include "segment.h"
 
@@ -89,20 +90,6 @@ static Status observe_residuals(const Solver *s, Instant at, Mechanism *b, Obser
     return OK;
 }
 
-/* What frictions do, of the latest motion. */
-static void observe_frictions(const Solver *s, Observed *o) {
-    const struct FrictionForces *f = s->stepped.friction;
-    for (int i = 0; i < s->system->frictions; i++) {
-        const int slips = !f->stick_slip[i].sticks && !f->held[i];
-        const double *force = f->tangential + 2 * i, *slip = f->slip + 2 * i;
-        o->sticks[i] = f->loaded[i] && !slips;
-        o->slip[2 * i] = slip[0];
-        o->slip[2 * i + 1] = slip[1];
-        o->margin[i] = f->mu[2 * i] * f->normal[i] - hypot(force[0], force[1]);
-        o->power[i] = slips ? force[0] * slip[0] + force[1] * slip[1] : 0;
-    }
-}
-
 /* Accelerations, lambda, Q and residuals. */
 static Status observe_solved(Solver *s, Instant at, Mechanism *b, Observed *o) {
     const int *active = s->active;
@@ -115,7 +102,7 @@ static Status observe_solved(Solver *s, Instant at, Mechanism *b, Observed *o) {
                                        : mechanism_motion(b, at, o->q, o->v, active);
     if (status == FAILED) return FAILED;
     observe_forces(b, o);
-    if (s->system->frictions > 0) observe_frictions(s, o);
+    if (s->system->frictions > 0) OPTIONAL.friction->observe(s, o);
     return observe_residuals(s, at, b, o);
 }
 

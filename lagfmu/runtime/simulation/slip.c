@@ -75,6 +75,27 @@ Status slip_work(Solver *s, double t0, double t1, double *lost) {
     return OK;
 }
 
+double slip_power(const Solver *s) {
+    const struct FrictionForces *f = s->stepped.friction;
+    double power = 0;
+    for (int i = 0; i < 2 * s->system->frictions; i++)
+        if (!f->stick_slip[i / 2].sticks) power -= f->tangential[i] * f->slip[i];
+    return power;
+}
+
+void slip_observe(const Solver *s, Observed *o) {
+    const struct FrictionForces *f = s->stepped.friction;
+    for (int i = 0; i < s->system->frictions; i++) {
+        const int slips = !f->stick_slip[i].sticks && !f->held[i];
+        const double *force = f->tangential + 2 * i, *slip = f->slip + 2 * i;
+        o->sticks[i] = f->loaded[i] && !slips;
+        o->slip[2 * i] = slip[0];
+        o->slip[2 * i + 1] = slip[1];
+        o->margin[i] = f->mu[2 * i] * f->normal[i] - hypot(force[0], force[1]);
+        o->power[i] = slips ? force[0] * slip[0] + force[1] * slip[1] : 0;
+    }
+}
+
 static Status rate(Solver *s, double t, const double *y, double *dydt) {
     const int nq = s->system->nq;
     if (segment_motion_near(s, segment_instant(s, t), y, y + s->system->nq) != OK) return FAILED;

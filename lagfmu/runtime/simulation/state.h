@@ -4,9 +4,9 @@
 #define LAGFMU_STATE_H
 
 #include "arena.h"
-#include "friction.h"
 #include "integrator.h"
 #include "linkage.h"
+#include "mechanism.h"
 #include "stiffness.h"
 #include "system.h"
 
