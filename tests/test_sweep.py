@@ -38,6 +38,7 @@ from lagfmu.testing import (
     distribution,
     engine,
     in_session,
+    load,
     run_batch,
     sampled,
 )
@@ -625,6 +626,14 @@ def test_a_scheduler_that_does_not_answer_is_told(hemisphere, monkeypatch):
         SimulationError, match=r"no Dask scheduler answers at 'tcp://127\.0\.0\.1:9'"
     ):
         lagfmu.sweep(hemisphere, {"theta": [0.1]}, on="tcp://127.0.0.1:9")
+
+
+def test_a_scene_by_name_is_of_a_model_file() -> None:
+    """A Model has no named scenes: the name is refused, it was left aside without a word."""
+    with pytest.raises(
+        LagfmuError, match=r"scene 'Other': .* of the model 'Pendulum\w*' give a Scene"
+    ):
+        lagfmu.sweep(load(MODELS / "pendulum.py").model, {"m": [1.0]}, scene="Other")
 
 
 def test_extremes_do_not_depend_on_the_communication_step(native_fmu: Any) -> None:

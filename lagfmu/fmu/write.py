@@ -121,13 +121,18 @@ def as_fmu(
     into a folder that goes again.  `scene`: of a file also by name, else its first.  `peaks`: outputs whose
     extremes a native FMU that is built shall tell; `sensitivities`: see Scene, what it can tell of them."""
     if isinstance(source, Model):
-        model, chosen = source, scene if isinstance(scene, Scene) else Scene(source.name)
+        if isinstance(scene, str):
+            raise SettingError(
+                f"scene {scene!r}: only the scenes of a model file have names; of the model {source.name!r} "
+                "give a Scene(...)"
+            )
+        model, chosen = source, scene or Scene(source.name)
     else:
         path = Path(source)
         if path.suffix != ".py":
             if scene is not None:
                 raise SettingError(
-                    f"scene {scene!r} is for a model file: {str(path)!r} is one already"
+                    f"scene {scene!r} is for a model file: {str(path)!r} is an FMU, built for its scene"
                 )
             yield path
             return
