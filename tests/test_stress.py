@@ -169,6 +169,18 @@ def test_eulers_equations_are_held_against_what_turns_in_space(lawful):
             assert f"Lagrange's equation of wheel.omega.{x}" in judged(one, change)
 
 
+def test_axes_are_parallel_to_rounding_of_their_length(lawful):
+    """A door's hinges hold products of axes of length 1 at 0, of which no coordinate shows the size: what is
+    left of them is rounding of 1, and 1e-12 is not."""
+    with Bench(lawful("Door"), quick=True) as one:
+        assert judged(one, lambda rows: None) == []
+
+        def change(rows):
+            rows["residual.lower.ry"][3] = 1e-12
+
+        assert judged(one, change) == ["residual.lower.ry"]
+
+
 def test_a_surface_that_pulls_is_found(bench):
     """lambda < 0 while closed; lambda != 0 in flight; r < a in flight; r = a + 1e-12 while closed."""
     closed = bench.ordinary.rows["contact.surface"]

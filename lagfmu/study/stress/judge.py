@@ -171,6 +171,8 @@ def _size(facts: Facts, run: Run, constraint: str) -> Column | None:
         # which name constraints of one word only: at least what has f's unit
         residual = names.name(names.RESIDUAL, constraint)
         least = max(facts.same_unit(residual, run.values), NOTHING * facts.usual(residual))
+        if not any(facts.dimensions[residual][:-1]):
+            least = max(least, 1.0)  # of axes of length 1, and of angles
         size = np.maximum(_largest_peer(facts, run, residual), least)
     for q, share in shares.items():
         if share is None:
