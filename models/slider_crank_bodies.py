@@ -87,13 +87,16 @@ forces = {
     "D": (0, needed["piston"][1] - C_y),
 }
 
+rod = dynamicsymbols("rod.orientation.z")
+right = cos(rod) > 0  # of the crank's pin is the piston
+
 closed_forms = [
     Conserved("energy", output("energy.total")),
-    ClosedForm("rod.orientation.z", psi),
-    ClosedForm("position.D", centers["piston"][0]),
-    ClosedForm("der(angle.A,2)", turning),
+    ClosedForm("rod's inclination", sin(psi), actual=sin(rod), when=right),
+    ClosedForm("position.D", centers["piston"][0], when=right),
+    ClosedForm("der(angle.A,2)", turning, when=right),
     *(
-        ClosedForm(f"force.{joint}.{x}", force, scale=output(f"force.{joint}.norm"))
+        ClosedForm(f"force.{joint}.{x}", force, scale=output(f"force.{joint}.norm"), when=right)
         for joint, components in forces.items()
         for x, force in zip("xy", components, strict=True)
     ),
