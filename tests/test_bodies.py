@@ -518,7 +518,7 @@ def test_a_given_start_that_cannot_be_moves_and_is_told_with_both_numbers():
     assert acos(reach) < angle < acos(reach) + 0.05
 
 
-@pytest.mark.parametrize("said_twice", [False, True])
+@pytest.mark.parametrize("said_twice", [False, pytest.param(True, marks=pytest.mark.thorough)])
 def test_a_chain_of_seventy_links_begins_where_its_angles_say(said_twice, monkeypatch):
     """Link k at the angle phi_k = sum a_j is at sum of (cos, sin) phi_j less the half of its own, and moves
     with w_k = sum a_j'; also where the angles of all links from the ground are given besides.  No dense

@@ -110,6 +110,7 @@ def test_any_joint_takes_the_rest_along(native_fmu: Fmu) -> None:
     assert found["angle.A"] == pytest.approx(pi / 4, rel=1e-14)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("ride", [0.01, 0.05, 0.33])
 def test_a_wheel_on_its_road_follows(native_fmu: Fmu, ride: float) -> None:
     """A car that its joint lifts stands as one whose height is given: while its wheel reaches the post it

@@ -198,6 +198,7 @@ def test_a_pdf_is_printed_where_there_is_a_browser(native_fmu, tmp_path, monkeyp
     assert re.search(rb"/Count [2-9]", content)
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(not shutil.which("firefox"), reason="no Firefox on this machine")
 def test_a_pdf_is_printed_by_firefox_where_there_is_no_chromium(native_fmu, tmp_path, monkeypatch):
     """Through the protocol that it listens to: A4 pages of the whole report, and no process is left."""

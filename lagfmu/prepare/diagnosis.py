@@ -6,6 +6,7 @@ Newton's method has failed when this is asked.  Each answer names the thing, its
 from __future__ import annotations
 
 import random
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -128,11 +129,14 @@ def _missed(at: Instant, q: Vector, v: Vector, rows: list[int], f: Vector, value
         for _ in range(SEARCHES)
     ]
 
-    def satisfiable(chosen: list[int]) -> list[Vector]:
-        found = [_projected(at, trial, v, chosen) for trial in tried]
-        return [x for x in found if x is not None]
+    def found(chosen: list[int]) -> Iterator[Vector]:
+        projected = (_projected(at, trial, v, chosen) for trial in tried)
+        return (x for x in projected if x is not None)
 
-    others = satisfiable(rows)
+    def satisfiable(chosen: list[int]) -> bool:
+        return next(found(chosen), None) is not None
+
+    others = list(found(rows))
     if others:
         best = min(others, key=lambda x: float(np.abs(x - q).max()))
         good = ", ".join(f"{n} = {x:.6g}" for n, x in zip(system.coordinates, best, strict=True))
@@ -142,7 +146,7 @@ def _missed(at: Instant, q: Vector, v: Vector, rows: list[int], f: Vector, value
             f"choose others, for example {good}"
         )
     for k in rows:
-        if not satisfiable([k]):
+        if len(rows) == 1 or not satisfiable([k]):
             return (
                 f"constraint {system.rows[k].name!r}: no configuration was found that satisfies it; "
                 f"at the start values {values} it is {f[k]:.3g}, expected 0: correct its expression "
