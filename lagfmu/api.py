@@ -22,7 +22,7 @@ from .live.icon import icon
 from .live.playable import playable
 from .live.render import render
 from .model.closed_form import ClosedForm, Conserved
-from .model.file import load
+from .model.file import in_scene
 from .model.goal import parse
 from .model.model import Model
 from .model.scene import Scene
@@ -119,14 +119,13 @@ class Shown:
         return text.strip()
 
 
-def show(model: Model | str | os.PathLike[str], scene: Scene | None = None) -> Shown:
+def show(model: Model | str | os.PathLike[str], scene: Scene | str | None = None) -> Shown:
     """Equations of motion, classes of constraints, degrees of freedom and units, to be printed or displayed.
 
-    `model` may be a model file.  Raises ModelError or DerivationError.
+    `model` may be a model file, and `scene` then a name.  Raises ModelError or DerivationError.
     """
-    if not isinstance(model, Model):
-        model = load(Path(model)).model
-    prepared = prepare(model, scene)
+    found = in_scene(model, scene)
+    prepared = prepare(found.model, None if scene is None else found.scene)
     return Shown(prepared, try_start(prepared))
 
 
@@ -141,7 +140,7 @@ def verify(
     statements: str | os.PathLike[str] | None = None,
     *,
     closed_forms: Sequence[ClosedForm | Conserved] = (),
-    scene: Scene | None = None,
+    scene: Scene | str | None = None,
 ) -> Verification:
     """verification.verify.verify() of an FMU; a model, or a model file with its closed forms, is built first
     (natively where a compiler is at hand)."""

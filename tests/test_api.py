@@ -12,6 +12,7 @@ from sympy import symbols
 from sympy.physics.mechanics import dynamicsymbols
 from typer.testing import CliRunner
 
+import lagfmu
 from lagfmu import (
     ClosedForm,
     Contact,
@@ -127,7 +128,14 @@ def test_a_model_file_runs_in_its_first_scene_unless_another_is_given(native_fmu
     path = MODELS / "pendulum.py"
     first, second, *_ = load(path).scenes
     assert simulate(path, 0.1).name == first.name
-    assert simulate(str(path), 0.1, scene=second).name == second.name
+    for scene in (second, second.name):
+        assert simulate(str(path), 0.1, scene=scene).name == second.name
+        assert lagfmu.show(path, scene).prepared.scene.name == second.name
+        assert lagfmu.play(path, scene).name == second.name
+    with pytest.raises(SettingError, match=r"no FMU is called 'Nothing'; known: "):
+        simulate(path, 0.1, scene="Nothing")
+    with pytest.raises(SettingError, match=r"scene .* is for a model file: .* is an FMU"):
+        lagfmu.play(native_fmu(first.name), second.name)
     with pytest.raises(SettingError, match=r"scene .* is for a model: .* is an FMU"):
         simulate(native_fmu(first.name), 0.1, scene=second)
 

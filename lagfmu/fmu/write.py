@@ -16,10 +16,10 @@ from types import MappingProxyType
 import numpy as np
 
 from .. import names
-from ..errors import BuildError, DerivationError, ModelError, RequestError, SettingError
+from ..errors import BuildError, DerivationError, ModelError, RequestError
 from ..interface.further import with_further
 from ..model.closed_form import ClosedForm, Conserved
-from ..model.file import load
+from ..model.file import fmu_at, in_scene
 from ..model.model import Contact, Model, Peak
 from ..model.scene import Scene
 from ..model.selection import select
@@ -120,31 +120,16 @@ def as_fmu(
     """An FMU as it is; of a model, or a model file, one that is built (natively where a compiler is at hand)
     into a folder that goes again.  `scene`: of a file also by name, else its first.  `peaks`: outputs whose
     extremes a native FMU that is built shall tell; `sensitivities`: see Scene, what it can tell of them."""
-    if isinstance(source, Model):
-        if isinstance(scene, str):
-            raise SettingError(
-                f"scene {scene!r}: only the scenes of a model file have names; of the model {source.name!r} "
-                "give a Scene(...)"
-            )
-        model, chosen = source, scene or Scene(source.name)
-    else:
-        path = Path(source)
-        if path.suffix != ".py":
-            if scene is not None:
-                raise SettingError(
-                    f"scene {scene!r} is for a model file: {str(path)!r} is an FMU, built for its scene"
-                )
-            yield path
-            return
-        file = load(path)
-        model, closed_forms = file.model, closed_forms or file.closed_forms
-        chosen = scene if isinstance(scene, Scene) else file.called(scene)[0]
+    if (path := fmu_at(source, scene)) is not None:
+        yield path
+        return
+    chosen = in_scene(source, scene)
     kind = target_of()
     with tempfile.TemporaryDirectory(prefix="lagfmu_") as folder:
-        prepared = prepare(model, chosen)
+        prepared = prepare(chosen.model, chosen.scene)
         if kind == NATIVE:
             prepared = with_sensitivities(with_peaks(prepared, peaks), sensitivities)
-        yield write(prepared, folder, closed_forms, kind)
+        yield write(prepared, folder, closed_forms or chosen.closed_forms, kind)
 
 
 def with_sensitivities(prepared: Prepared, wanted: Sequence[str]) -> Prepared:

@@ -8,7 +8,7 @@ from html import escape
 from pathlib import Path
 
 from ..fmu.write import write_whole
-from ..model.file import load
+from ..model.file import fmu_at, in_scene
 from ..model.model import Model
 from ..model.scene import Scene
 from ..prepare.prepare import prepare
@@ -41,18 +41,20 @@ class Played:
 
 
 def play(
-    target: Model | str | os.PathLike[str], scene: Scene | None = None, height: int = HEIGHT
+    target: Model | str | os.PathLike[str], scene: Scene | str | None = None, height: int = HEIGHT
 ) -> Played:
     """The page in which the FMU of a model, a model file or a native FMU runs; a notebook shows it, `height`
     pixels high.
 
     Raises ModelError, DerivationError, and BuildError where nothing can be compiled (ziglang).
     """
-    made = _playable(target if isinstance(target, Model) else Path(target), scene)
+    made = _playable(target, scene)
     return Played(made.name, render(made), height)
 
 
-def write_page(target: Model | Path, out: Path | None = None, scene: Scene | None = None) -> Path:
+def write_page(
+    target: Model | Path, out: Path | None = None, scene: Scene | str | None = None
+) -> Path:
     """Write the page of a model or a model file (in `scene`, default: its first) or of a native FMU.
 
     `out` is the HTML file, by default dist/page/NAME.html.  Raises ModelError, DerivationError,
@@ -62,14 +64,12 @@ def write_page(target: Model | Path, out: Path | None = None, scene: Scene | Non
     return page.write(out or FOLDER / f"{page.name}.html")
 
 
-def _playable(target: Model | Path, scene: Scene | None) -> Playable:
-    if not isinstance(target, Model):
-        if target.suffix != ".py":
-            return playable(target)
-        file = load(target)
-        target, scene = file.model, scene or file.scenes[0]
-    prepared = prepare(target, scene)
+def _playable(target: Model | str | os.PathLike[str], scene: Scene | str | None) -> Playable:
+    if (path := fmu_at(target, scene)) is not None:
+        return playable(path)
+    chosen = in_scene(target, scene)
+    prepared = prepare(chosen.model, chosen.scene)
     moved = prepared.structure.start.moved
-    check_given(target.name, moved, prepared.structure.missed)
+    check_given(chosen.model.name, moved, prepared.structure.missed)
     tell(moved)
     return playable(prepared)

@@ -9,7 +9,7 @@ import traceback
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from ..errors import LagfmuError, ModelError, SettingError
 from .closed_form import ClosedForm, Conserved
@@ -38,6 +38,42 @@ class ModelFile:
                 f"{self.path}: no FMU is called {unknown}; known: {', '.join(known)}"
             )
         return [s for s in self.scenes if names is None or s.name in names]
+
+
+class Chosen(NamedTuple):
+    """A model in one of its scenes, with the closed forms of its file."""
+
+    model: Model
+    scene: Scene
+    closed_forms: tuple[ClosedForm | Conserved, ...] = ()
+
+
+def in_scene(source: Model | str | os.PathLike[str], scene: Scene | str | None = None) -> Chosen:
+    """A Model, or a model file, in `scene`; of a file also by its name, else its first.
+
+    Raises SettingError for a name that no scene has, and ModelError as load().
+    """
+    if isinstance(source, Model):
+        if isinstance(scene, str):
+            raise SettingError(
+                f"scene {scene!r}: only the scenes of a model file have names; of the model {source.name!r} "
+                "give a Scene(...)"
+            )
+        return Chosen(source, scene or Scene(source.name))
+    file = load(source)
+    chosen = scene if isinstance(scene, Scene) else file.called(scene)[0]
+    return Chosen(file.model, chosen, file.closed_forms)
+
+
+def fmu_at(source: Model | str | os.PathLike[str], scene: Scene | str | None = None) -> Path | None:
+    """The path, unless it is that of a model file.  Raises SettingError for a scene of an FMU."""
+    if isinstance(source, Model) or Path(source).suffix == ".py":
+        return None
+    if scene is not None:
+        raise SettingError(
+            f"scene {scene!r} is for a model file: {str(source)!r} is an FMU, built for its scene"
+        )
+    return Path(source)
 
 
 def load(path: str | os.PathLike[str], arguments: Sequence[str] = ()) -> ModelFile:

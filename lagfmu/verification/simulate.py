@@ -38,7 +38,7 @@ from ..fmu.session import (
 from ..fmu.target import PYTHON, target_of
 from ..fmu.write import as_built
 from ..interface.rules import problems_of
-from ..model.file import load
+from ..model.file import in_scene
 from ..model.model import Model
 from ..model.rule import Rule
 from ..model.scene import Scene
@@ -63,16 +63,17 @@ def simulate(
     tolerance: float | None = None,
     start_values: Mapping[str, Any] | None = None,
     inputs: Trajectory | None = None,
-    scene: Scene | None = None,
+    scene: Scene | str | None = None,
     besides: Sequence[str] = (),
     error_bars: bool = False,
     target: str | None = None,
 ) -> Result:
     """Outputs at every communication point, as a structured array with the FMU's variable names and units.
 
-    `source` is a Model (in `scene`), a model file (without `scene` in its first), or the path of an FMU.  A
-    model runs as `target`: 'native', compiled for this run, or 'python', integrated in this process; without
-    one it is native where a C compiler is at hand, else python, with a warning that names what to install.
+    `source` is a Model (in `scene`), a model file (in it, also by its name, or in its first), or the path
+    of an FMU.  A model runs as `target`: 'native', compiled for this run, or 'python', integrated in this
+    process; without one it is native where a C compiler is at hand, else python, with a warning that names
+    what to install.
 
     Times in seconds; `start_values` maps parameters, coordinates, velocities and `solver.*` to values;
     `inputs` is a structured array with 'time' and one field an input, interpolated linearly.  What is left
@@ -91,10 +92,9 @@ def simulate(
     if tolerance is not None and (problem := tolerance_problem(tolerance)):
         raise SettingError(problem)
     if isinstance(source, (str, os.PathLike)) and Path(source).suffix == ".py":
-        file = load(source)
-        source, scene = file.model, scene or file.scenes[0]
+        source, scene, _ = in_scene(source, scene)
     if isinstance(source, Model):
-        source = prepare(source, scene)
+        source = prepare(source, in_scene(source, scene).scene)
     asked = _Asked(stop_time, step_size, tolerance, dict(start_values or {}), inputs, besides)
     if isinstance(source, Prepared):
         if error_bars and not source.asked.error_bars:
