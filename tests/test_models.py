@@ -159,9 +159,8 @@ DISKS = [
     disk(3.0, 0.25, 9.81, np.pi / 2),
     disk(1e-6, 1e4, 9.81, 0.7),
 ]
-WORLDS: dict[
-    str, list[Case]
-] = {  # masses, lengths, times and starts of any size: seconds to run, values
+# masses, lengths, times and starts of any size: seconds to run, values
+WORLDS: dict[str, list[Case]] = {
     "Hemisphere": [
         on_a_sphere(1.0, 9.81, 1.0, 1e-6, 0.0),
         on_a_sphere(1.0, 9.81, 1.0, 0.01, 0.1),

@@ -125,12 +125,16 @@ class Dependencies:
         settled = {j for places in eom.quaternions for j in places} | eom.unwrapped.keys()
         return moved | {str(eom.q[j]) for j in settled}
 
+    @cached_property
+    def _angles(self) -> dict[str, Expr]:
+        """What each angle that goes on over turns equals modulo 2 pi, by its name."""
+        return {str(self.stepped.q[j]): e for j, e in self.stepped.unwrapped.items()}
+
     def at_points(self, symbols: Iterable[str]) -> tuple[str, ...]:
         """Inputs, states and the time behind a value at a communication point."""
         asked = frozenset(symbols)
         if asked not in self._sorted_at_points:
-            angles = {str(self.stepped.q[j]): e for j, e in self.stepped.unwrapped.items()}
-            settled = self.symbols(*(e for name, e in angles.items() if name in asked))
+            settled = self.symbols(*(self._angles[name] for name in asked & self._angles.keys()))
             known = {n for n in asked | settled if n in self.known or n == names.TIME}
             self._sorted_at_points[asked] = self._sorted(known)
         return self._sorted_at_points[asked]

@@ -18,9 +18,8 @@ from ..model.rule import MESSAGES, Rule
 from ..model.units import for_reading
 from ..page.preset import SETTABLE
 
-USUAL: dict[
-    str, Any
-] = {  # of a variable; `reference`: its place.  What is seldom usual comes first
+# of a variable; `reference`: its place.  What is seldom usual comes first
+USUAL: dict[str, Any] = {
     **dict.fromkeys(("name", "description", "group", "unit"), ""),
     **{"discrete": False, "counted": "", "type": "Real", "role": "output", "column": True},
     **dict.fromkeys(("start", "min", "max")),

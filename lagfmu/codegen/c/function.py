@@ -321,9 +321,8 @@ def _body(
     local |= {s: f"{a}[{k}]" for s, (a, k) in places.items()}
     common, reduced = common_subexpressions(values, taken)
     printed = [*reduced, *(e for _, e in common), *(x for s in closing.steps for x in s.numbers)]
-    symbols = set().union(
-        *(e.free_symbols for e in printed)
-    )  # a vector may hold more than is read of it
+    # a vector may hold more than is read of it
+    symbols = set().union(*(e.free_symbols for e in printed))
     printer = Printer(local)
     used = {s.array for s in statements}
     lines = []

@@ -6,7 +6,7 @@
  *   err = h |E5|^2 / sqrt((|E5|^2 + 0.01 |E3|^2) n) ,
  *   E5 = sum_s e_s k_s ,   E3 = sum_s (b_s - bh_s) k_s
  *
- * E5 is zero by chance where y'' has a kink (a knot of a table, max(0, x)) 0.26, 0.33, 0.47, 0.62 or 0.80 of the
+ * E5 is zero by chance where f has a kink (a knot of a table, max(0, x)) 0.26, 0.33, 0.47, 0.62 or 0.80 of the
  * way through the step.  So a step must pass a second estimate too, E6 = sum_s w_s k_s in place of E5, which
  * is not zero there.  w is the one combination of these stages that fulfils all conditions of order 6 (with 0
  * on the right: sect. II.2, theorem 2.13), normalized so that a kink makes E5 and E6 equally large at most: of a
