@@ -6,15 +6,13 @@ second bodies of the pins that close the loops, in the axes of the ground.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from loops import Loops
 from plane import GROUND, Pin
-from rods_elsewhere import DECADES, Peer, Run
-from scipy.integrate import solve_ivp
+from rods_elsewhere import DECADES, Peer, Run, by_scipy
 
 PARTS = (5, 10, 20, 50, 100, 200, 500, 1000)  # steps between two samples
 
@@ -249,17 +247,9 @@ def pinocchio_tree(problem: Loops, tolerance: float) -> Run:
             tau = push + J[:3].T @ pull + J[3:].T @ np.cross(arm, pull)
         return pin.constraintDynamics(model, data, q, v, tau, loops, known, proximal)
 
-    def rate(_t: float, y: Any) -> Any:
-        return np.concatenate([y[n:], accelerations(y[:n], y[n:])])
-
     def run() -> Any:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of SciPy: rtol below 2.2e-14
-            found = solve_ivp(
-                rate, (0, problem.stop), y0, "DOP853", problem.times, rtol=tolerance, atol=tolerance
-            )
         rows = []
-        for y in found.y.T:
+        for y in by_scipy(accelerations, y0, problem, tolerance):
             accelerations(y[:n], y[n:])
             forces = [-(c.oMc1.rotation @ c.contact_force.linear)[:2] for c in known]
             rows.append(np.concatenate(forces))

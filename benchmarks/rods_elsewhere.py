@@ -203,6 +203,23 @@ def mujoco_tendons(problem: Rods, step: float) -> Run:
     return run
 
 
+def by_scipy(
+    accelerations: Callable[[Any, Any], Any], y0: Any, problem: Any, tolerance: float
+) -> Any:
+    """The states (q, v) at the problem's times, by SciPy's DOP853, of  q'' = accelerations(q, v)."""
+    n = len(y0) // 2
+
+    def rate(_t: float, y: Any) -> Any:
+        return np.concatenate([y[n:], accelerations(y[:n], y[n:])])
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of SciPy: rtol below 2.2e-14
+        found = solve_ivp(
+            rate, (0, problem.stop), y0, "DOP853", problem.times, rtol=tolerance, atol=tolerance
+        )
+    return found.y.T
+
+
 def pinocchio_joints(problem: Rods, tolerance: float) -> Run:
     """Joint angles by Pinocchio's articulated-body algorithm, integrated by SciPy's DOP853; the forces at the
     joints by its recursive Newton-Euler algorithm."""
@@ -221,18 +238,13 @@ def pinocchio_joints(problem: Rods, tolerance: float) -> Run:
     rest = np.zeros(n)
     y0 = np.concatenate([[-problem.angle], np.zeros(2 * n - 1)])
 
-    def rate(_t: float, y: Any) -> Any:
-        return np.concatenate([y[n:], pinocchio.aba(model, data, y[:n], y[n:], rest)])
+    def accelerations(q: Any, v: Any) -> Any:
+        return pinocchio.aba(model, data, q, v, rest)
 
     def run() -> Any:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of SciPy: rtol below 2.2e-14
-            found = solve_ivp(
-                rate, (0, problem.stop), y0, "DOP853", problem.times, rtol=tolerance, atol=tolerance
-            )
         rows = []
-        for y in found.y.T:
-            a = pinocchio.aba(model, data, y[:n], y[n:], rest)
+        for y in by_scipy(accelerations, y0, problem, tolerance):
+            a = accelerations(y[:n], y[n:])
             pinocchio.rnea(model, data, y[:n], y[n:], a)
             rows.append([data.f[k].linear[2] for k in range(1, n + 1)])
         return rods.array(rows)

@@ -6,15 +6,13 @@ A peer prepares the model once and answers a run from the start, which gives m (
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from linkage import Tie
 from loops_elsewhere import PARTS
-from rods_elsewhere import DECADES, Peer, Run
-from scipy.integrate import solve_ivp
+from rods_elsewhere import DECADES, Peer, Run, by_scipy
 from space import Space
 from system import G
 
@@ -243,17 +241,9 @@ def pinocchio_tree(problem: Space, tolerance: float) -> Run:
             return pin.aba(model, data, q, v, tau)
         return pin.constraintDynamics(model, data, q, v, tau, loops, known, proximal)
 
-    def rate(_t: float, y: Any) -> Any:
-        return np.concatenate([y[n:], accelerations(y[:n], y[n:])])
-
     def run() -> Any:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of SciPy: rtol below 2.2e-14
-            found = solve_ivp(
-                rate, (0, problem.stop), y0, "DOP853", problem.times, rtol=tolerance, atol=tolerance
-            )
         rows = []
-        for y in found.y.T:
+        for y in by_scipy(accelerations, y0, problem, tolerance):
             a = accelerations(y[:n], y[n:]).copy()
             pin.forwardKinematics(model, data, y[:n], y[n:], a)
             rows.append(
