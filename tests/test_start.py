@@ -16,7 +16,7 @@ from sympy import cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 from typer.testing import CliRunner
 
-from lagfmu import Model, Parameter, Scene, simulate, sweep
+from lagfmu import Holonomic, Model, Parameter, Scene, simulate, sweep
 from lagfmu.errors import ModelError, SimulationError
 from lagfmu.testing import StartMovedWarning, app, prepare, write
 
@@ -93,6 +93,24 @@ def test_what_the_importer_sets_stays_and_the_given_values_follow(rod):
     assert (at["x"], at["der(theta)"]) == (0.6, 1.86)
     assert at["theta"] == pytest.approx(np.arccos(0.8), rel=1e-14)
     assert any("start value theta = 0.3 misses" in t and repr(at["theta"])[:12] in t for t in told)
+
+
+@pytest.mark.parametrize("target", ["python", "native"])
+def test_inertia_alone_moves_no_value_that_meets_no_constraint(target: str, built: Built) -> None:
+    """A cart's pendulum is held at another angle than is given: the cart, of which nothing is said and which
+    no constraint holds, stays at 0, however its inertia is coupled to the pendulum's."""
+    m, L, held = symbols("m L held", positive=True)
+    cart = Model(
+        name="HeldPendulum",
+        lagrangian=m * (x.diff() + L * theta.diff() * cos(theta)) ** 2 / 2 + m * x.diff() ** 2,
+        coordinates={x: "m", theta: "rad"},
+        constraints=[Holonomic("clamp", theta - held)],
+        parameters=[Parameter(m, 1.0, "kg"), Parameter(L, 0.5, "m"), Parameter(held, 0.3, "rad")],
+        start={theta: 0.3},
+    )
+    at, _ = begun(built(cart, target=target), held=0.31, theta_dot=2.0)
+    assert at["theta"] == pytest.approx(0.31, rel=1e-15)
+    assert (at["x"], at["der(x)"], at["der(theta)"]) == (0.0, 0.0, 0.0)
 
 
 def test_velocities_that_are_set_move_the_least_where_all_are(rod):

@@ -8,7 +8,8 @@ given.  With a stage's coordinates free and the others held, a projection onto G
 
 W (diagonal) makes the priorities of a stage so unlike in mass that of two which could move the lower one
 does, and the higher one least: the limit of least squares with unequal weights (Golub & Van Loan, Matrix
-Computations, sect. 12.1.5).  Positions by a damped Newton's method (Deuflhard, Newton Methods for Nonlinear
+Computations, sect. 12.1.5).  M couples none of unlike priority: inertia would throw the light one by 1/W.
+Positions by a damped Newton's method (Deuflhard, Newton Methods for Nonlinear
 Problems, sect. 3.1), the step halved until |f| falls; velocities, which are linear, at once.
 """
 
@@ -41,9 +42,13 @@ HALVINGS = 25  # of a step of Newton's method
 
 @dataclass(frozen=True)
 class Stage:
-    """Who may move: `free` (nv), and how reluctantly: `weight` (nv); `priority`: the highest that may."""
+    """Who may move, `free` (nv), and how reluctantly, `weight` (nv).
+
+    `priority` is the highest that may, `of` (nv) are all.
+    """
 
     priority: int
+    of: NDArray[np.int_]
     free: NDArray[np.bool_]
     weight: Vector
 
@@ -57,7 +62,8 @@ class Stage:
         linear.py."""
         free, weight, M, G = self.free, self.weight, M.tocoo(), G.tocoo()
         i, j = M.row, M.col
-        mass = M.data * (free[i] & free[j] | (i == j)) * weight[j] * weight[i]
+        coupled = (i == j) | free[i] & free[j] & (self.of[i] == self.of[j])
+        mass = M.data * coupled * weight[j] * weight[i]
         M = csr_array((mass, (i, j)), M.shape)
         G = csr_array((G.data * free[G.col], (G.row, G.col)), G.shape)
         return solve(M, np.zeros(len(free)), G, c, nearest=True, off=off)[0]
@@ -70,7 +76,7 @@ def stages(priority: Sequence[int]) -> Iterator[Stage]:
         if (of == highest).any():
             free = of <= highest
             below = np.where(of == OMITTED, 2 if highest > OMITTED else 0, highest - of)
-            yield Stage(highest, free, np.where(free, PRIORITY_EASE**below, 1.0))
+            yield Stage(highest, of, free, np.where(free, PRIORITY_EASE**below, 1.0))
 
 
 def initial_positions(

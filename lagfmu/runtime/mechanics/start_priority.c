@@ -4,7 +4,8 @@
  *
  * with the coordinates of a stage free and the others held.  W (diagonal) makes the priorities of a stage so
  * unlike in mass that of two which could move the lower one does, and the higher one least: the limit of
- * least squares with unequal weights (Golub & Van Loan, Matrix Computations, sect. 12.1.5). */
+ * least squares with unequal weights (Golub & Van Loan, Matrix Computations, sect. 12.1.5).  M couples none of
+ * unlike priority: inertia would throw the light one by 1/W. */
 #include "start_priority.h"
 
 #include "thresholds.h"
@@ -49,7 +50,7 @@ Status priority_nearest(Mechanism *b, const Priority *priority, int stage, const
     for (int e = 0; e < s->masses; e++) {
         const int i = s->mass_row[e], j = s->mass_column[e];
         const int held = (int)priority[i] > stage || (int)priority[j] > stage;
-        if (held && i != j) b->M[e] = 0;
+        if (i != j && (held || priority[i] != priority[j])) b->M[e] = 0;
         if (!held) b->M[e] *= weight(priority[i], stage, ease) * weight(priority[j], stage, ease);
     }
     for (int e = 0; e < s->entries; e++)
