@@ -2,12 +2,13 @@
 
     python benchmarks/mutants.py [--stress] [--control] [WORD ...]
 
-Each defect of mutants.toml is made in a copy of the package, and the tests aimed at it run there until
-one fails.  Printed is a row a defect: what it breaks, and the test that noticed, or why none can; at the
-end, which were noticed only by tests without an end within 60 s of processor time.  WORD: only defects with
-one of these words in their file or description.  --stress: not the tests but `lagfmu stress`, of the models
-that a defect names.  --control: the same tests without any defect, first.  The exit code is 1 if a defect
-survives of which no reason is known, or one is found that was thought to make no difference.
+Each defect of mutants.toml is made in a copy of the package, and the tests aimed at it run there, of
+those that `pytest` runs by itself, until one fails.  Printed is a row a defect: what it breaks, and the
+test that noticed, or why none can; at the end, which were noticed only by tests without an end within 60
+s of processor time.  WORD: only defects with one of these words in their file or description.  --stress:
+not the tests but `lagfmu stress`, of the models that a defect names.  --control: the same tests without
+any defect, first.  The exit code is 1 if a defect survives of which no reason is known, or one is found
+that was thought to make no difference.
 """
 
 from __future__ import annotations
@@ -103,7 +104,7 @@ def _run(command: list[str], folder: Path) -> tuple[int, str]:
 
 def _found_by_tests(tests: list[str], folder: Path) -> str:
     """The test that fails first; empty if none does."""
-    options = ["-x", "-v", "--tb=no", "-o", "addopts=", "-p", "no:cacheprovider"]
+    options = ["-x", "-v", "--tb=no", "-o", "addopts=-m 'not thorough'", "-p", "no:cacheprovider"]
     options += ["-k", "not [python and not -python"]  # the C runtime is not in those
     end, said = _run(["pytest", *options, f"--basetemp={folder / 'made'}", *tests], folder)
     if end == 0:
