@@ -293,6 +293,7 @@ def test_a_kink_is_no_jump(force, lagrangian):
     ("force", "surfaces"),
     [
         (F * sign(x), {x}),
+        (F * x / Abs(x), {x}),
         (F * Heaviside(x - L) * Heaviside(2 * L - x), {x - L, x - 2 * L}),
         (F * sign(cos(2 * pi * t / T)), {cos(2 * pi * t / T)}),
         (F * sign(u) + F * Heaviside(x * sign(x) - L), {u, x * sign(x) - L}),

@@ -407,7 +407,8 @@ class Parts:
         self, name: str, doc: str, arguments: Arguments, results: Mapping[str, Sequence[Value]]
     ) -> Function:
         kept = {p for p in self.varied if str(p) not in self.by}
-        d = Differential({s: change for s, change in self.change.items() if s not in kept})
+        moving = {s: change for s, change in self.change.items() if s not in kept}
+        d = Differential(moving, roots=bool(self.by) and not name.startswith("outputs"))
         along = {
             f"d{a}": tuple(self.change[s] for s in symbols if s in self.change)
             for a, symbols in arguments.items()

@@ -157,6 +157,10 @@ def _surface(node: Expr) -> Surface | None:
         return Surface(node.args[0], True)
     if isinstance(node, Relational):
         return Surface(_oriented(node.lhs - node.rhs), False)
+    if isinstance(node, sp.Abs):
+        return Surface(_oriented(node.args[0]), False)
+    if isinstance(node, (sp.Min, sp.Max)) and len(node.args) == 2:
+        return Surface(_oriented(node.args[0] - node.args[1]), False)
     return None
 
 
@@ -173,7 +177,13 @@ def _at(node: Expr, table: Mapping[Surface, Expr]) -> Expr:
     new = table[surface]
     if isinstance(node, Relational):
         return node.func(new if node.lhs - node.rhs == surface.h else -new, 0)
+    if isinstance(node, (sp.Min, sp.Max)):
+        a, b = node.args if (node.args[0] - node.args[1] == surface.h) else node.args[::-1]
+        over, under = (a, b) if isinstance(node, sp.Max) else (b, a)
+        return sp.Piecewise((over, new > 0), (under, True))
     argument = new if surface.at_integers or node.args[0] == surface.h else -new
+    if isinstance(node, sp.Abs):
+        return node.args[0] * sp.sign(argument)
     return node.func(argument, *node.args[1:])
 
 

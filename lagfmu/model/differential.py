@@ -23,10 +23,12 @@ CONSTANT_PIECES = (sp.sign, sp.Heaviside, sp.floor, sp.ceiling)
 
 
 class Differential:
-    """d e for expressions e; `direction` maps a symbol to the symbol of its change."""
+    """d e for expressions e; `direction` maps a symbol to the symbol of its change.  `roots`: sqrt(x^2 + y^2)
+    changes by 0 at x = y = 0, as it does in a product with what is 0 there, the drag |v| v."""
 
-    def __init__(self, direction: Mapping[Expr, Expr]) -> None:
+    def __init__(self, direction: Mapping[Expr, Expr], roots: bool = False) -> None:
         self.known: dict[Expr, Expr] = dict(direction)
+        self.roots = roots
 
     def __call__(self, e: Expr) -> Expr:
         """The change of e for the changes of the symbols in it."""
@@ -51,7 +53,9 @@ class Differential:
                 )
             )
         if e.is_Pow and self(e.exp) == 0:
-            return e.exp * e.base ** (e.exp - 1) * self(e.base)
+            change, slope = self(e.base), e.exp * e.base ** (e.exp - 1)
+            at_rest = self.roots and _is_root(e) and change != 0
+            return Share(change, slope) if at_rest else slope * change
         if isinstance(e, sp.Piecewise):
             return sp.Piecewise(*((self(case.expr), case.cond) for case in e.args))
         if isinstance(e, CONSTANT_PIECES):
@@ -78,6 +82,11 @@ class Differential:
                 )
             terms.append(rate.xreplace(back) * change)
         return sp.Add(*terms)
+
+
+def _is_root(e: Expr) -> bool:
+    """True of a root of what may be 0, where it has no slope."""
+    return bool(e.exp.is_number and 0 < e.exp < 1 and not e.base.is_positive)
 
 
 class Share(sp.Function):  # type: ignore[misc]

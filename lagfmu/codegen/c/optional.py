@@ -25,6 +25,7 @@ DERIVATIVES = (
     "kept.c",
     "peak_changes.c",
     "saltation.c",
+    "unwatched.c",
     "variation.c",
 )  # behind VARIATION
 SLIDING = "sliding_along.c"  # behind OPTIONAL, of both

@@ -123,6 +123,7 @@ static Status step_towards(Solver *s, double t_end, double bound, double longest
     if (near && OPTIONAL.passage->find(s) != OK) return FAILED;
     if (watch && OPTIONAL.events_find(s, y1) != OK) return FAILED;
     if (s->system->frictions > 0 && slide_on(s, y1) != OK) return FAILED;
+    if (s->columns > 0) OPTIONAL.variation->look(s);
     integrator_move(i, y1);
     s->state.now.steps += 1;
     if (s->state.now.choice.implicit) stiffness_implicit_step(&s->state.now.choice, i);

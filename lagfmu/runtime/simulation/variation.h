@@ -33,6 +33,8 @@ typedef struct {
     /* Does what `map` does, at an event of the indicators in state.left, or at a given time: columns go with it. */
     Status (*pass)(Solver *s, Map map);
     Status (*jump)(Solver *s, Map map);
+    /* The step just taken, not yet moved: the columns end where it went over a jump that is no event. */
+    void (*look)(Solver *s);
     /* Why the columns ended, since it was last asked; empty where they did not. */
     const char *(*ended)(Solver *s, Why *text);
     /* peak_changes.c: changes of the records `which` (2 peaks: largest and smallest of each) at the state of now, whose
@@ -51,6 +53,9 @@ SHARED Status saltation_start(Solver *s, Map map, void *context);
 SHARED Status saltation_pass(Solver *s, Map map);
 SHARED Status saltation_jump(Solver *s, Map map);
 SHARED const char *saltation_ended(Solver *s, Why *text);
+
+/* unwatched.c */
+SHARED void unwatched_look(Solver *s);
 
 /* peak_changes.c */
 SHARED void vary_peaks(Solver *s, const int *which, PeakKind kind, double near);
