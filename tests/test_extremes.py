@@ -703,6 +703,32 @@ def tray() -> Model:
     )
 
 
+@pytest.mark.parametrize("target", ["python", "native"])
+def test_the_smallest_angles_cost_no_step(built, target):
+    """Two levers at 1e-7 rad: f = 3 (h cos phi + w sin theta) - R, of lengths that cancel, has no 0 among
+    doubles, and its rounding, 1e-16 m, is far more than that of w theta.  phi is 1e-7 cos(t sqrt(k/m)/h)."""
+    phi, theta = dynamicsymbols("phi theta")
+    m, h, w, R, k, n = symbols("m h w R k n", positive=True)
+    model = Model(
+        name="FlatLevers",
+        lagrangian=m * h**2 * (phi.diff() ** 2 + theta.diff() ** 2) / 2 - k * phi**2 / 2,
+        coordinates={phi: "rad", theta: "rad"},
+        constraints=[Holonomic("height", n * (h * cos(phi) + w * sin(theta)) - R)],
+        parameters=[
+            Parameter(m, 1.0, "kg"),
+            Parameter(h, 0.3, "m"),
+            Parameter(w, 1.0, "m"),
+            Parameter(R, 0.9, "m"),
+            Parameter(n, 3.0, "1"),
+            Parameter(k, 1.0, "N.m/rad"),
+        ],
+        start={phi: 1e-7},
+    )
+    run = simulate(built(model, target=target), stop_time=2.0)
+    assert run["phi"] == pytest.approx(1e-7 * np.cos(run["time"] / 0.3), abs=1e-13)
+    assert np.abs(run["residual.height"]).max() < 2e-16
+
+
 @pytest.mark.parametrize("amplitude", [1e-300, 1e-160, 1e-20, 1e-12, 1e-6])
 def test_a_place_near_zero_is_projected_to_rounding_of_the_terms(built, amplitude):
     """Swings of 1e-6 rad to 1e-300 rad: L (1 - cos theta) is rounding of L, the height is 0 but for 5e-13 m;

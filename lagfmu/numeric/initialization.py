@@ -125,12 +125,14 @@ def _newton(
 ) -> tuple[Vector, Vector]:
     """Where the free coordinates come to, and what is then missed of f; 0 where that is rounding.
 
-    It has arrived where f is rounding of its terms, which are of the size of q or of a parameter; or, since f
-    may hold larger ones (an input), where f falls no more and is rounding of what it was made of at the start
-    (`size`).  While it falls on and on, there is nothing to arrive at.
+    It has arrived where f is rounding of its terms, which are of the size of q or of a parameter, for angles
+    of 1 rad, since their sines and cosines stand beside 1; or, since f may hold larger ones (an input), where
+    f falls no more and is rounding of what it was made of at the start (`size`).  While it falls on and on,
+    there is nothing to arrive at.
     """
     own = stage.rows(at.system, fixed)
     least = extents(at.system, at.p)
+    least[list(at.system.angles)] = 1.0
     q, f = q0, at.residual(q0)[fixed]
     for _ in range(INITIAL_ITERATIONS):
         M, _, G, _, _ = at.equations(q, v0)

@@ -32,9 +32,10 @@ static void take_basis(Mechanism *b, const int *rows) {
 }
 
 /* How far the positions are off: `error` is the largest |f - offset| relative to its own terms; infinite where
- * a row has none, since no coordinate moves it here. */
+ * a row has none, since no coordinate moves it here.  `turned`: where each angle counts as 1 rad, since its sine
+ * and cosine stand beside 1: of lengths that cancel at angles near 0, f is rounded as a whole. */
 typedef struct {
-    double error, largest;
+    double error, turned, largest;
     int rounding;
 } Miss;
 
@@ -42,7 +43,7 @@ typedef struct {
 static Status measure(Mechanism *b, Instant at, const double *q, const double *offset,
                       const double *span, Miss *miss) {
     const System *s = b->system;
-    *miss = (Miss){0, 0, 1};
+    *miss = (Miss){0, 0, 0, 1};
     if (mechanism_residual(b, at, q, b->f) == FAILED) return FAILED;
     for (int i = 0; i < s->nv; i++) {
         const double x = mechanism_reach(b, q, i);
@@ -51,18 +52,20 @@ static Status measure(Mechanism *b, Instant at, const double *q, const double *o
     }
     for (int k = 0; k < s->m; k++) {
         if (!b->fixed[k]) continue;
-        double steepness = 0, reach = 0;
+        double steepness = 0, reach = 0, turned = 0;
         for (int e = s->row_start[k]; e < s->row_start[k + 1]; e++) {
             const int i = s->entry_column[e];
             const double g = fabs(b->G[e]);
             steepness += g * b->place[i];
             reach += g * b->reach[i];
+            turned += g * (s->speed_dimension[i] == s->angles ? fmax(b->reach[i], 1) : b->reach[i]);
         }
         b->f[k] = offset[k] - b->f[k];
         double off = fabs(b->f[k]);
         if (off <= 2 * DBL_EPSILON * steepness) continue;
         miss->rounding = 0;
         if (off > miss->error * reach) miss->error = off / reach;
+        if (off > miss->turned * turned) miss->turned = off / turned;
         if (off > miss->largest) miss->largest = off;
     }
     return OK;
@@ -94,7 +97,8 @@ static Status project_positions(Mechanism *b, Instant at, double *q, const doubl
         if (measure(b, at, q, offset, span, &miss) == FAILED) return FAILED;
         *moved = count > 0;
         if (miss.rounding || miss.error < DBL_EPSILON * DBL_EPSILON) return OK;
-        if (miss.error > before / 2 && miss.error < (kept ? PROJECTION_ROUNDING : PROJECTION_SMALL))
+        if (miss.error > before / 2 && (miss.error < (kept ? PROJECTION_ROUNDING : PROJECTION_SMALL) ||
+                                        miss.turned < PROJECTION_ROUNDING))
             return OK; /* rounding in f is left */
         if (count == PROJECTION_ITERATIONS && miss.error < PROJECTION_ROUNDING) return OK;
         if (count == PROJECTION_ITERATIONS) return no_arrival(b, at, &miss, before);

@@ -78,9 +78,10 @@ static Status cannot_be_projected(const Start *x, const int *rows, const double 
 
 /* One stage: q is moved.
  *
- * It has arrived where f is rounding of its terms, which are of the size of q or of a parameter; or,
- * since f may hold larger ones (an input), where f falls no more and is rounding of what it was made
- * of at the start (`size`).  While it falls on and on, there is nothing to arrive at. */
+ * It has arrived where f is rounding of its terms, which are of the size of q or of a parameter, for angles of
+ * 1 rad, since their sines and cosines stand beside 1; or, since f may hold larger ones (an input), where f falls
+ * no more and is rounding of what it was made of at the start (`size`).  While it falls on and on, there is
+ * nothing to arrive at. */
 static Status newton_at_start(const Start *x, int stage, double *q, const int *rows) {
     const System *s = x->s->system;
     Mechanism *b = &x->s->stepped;
@@ -89,6 +90,8 @@ static Status newton_at_start(const Start *x, int stage, double *q, const int *r
     int *own = x->s->iwork_initial + s->m;
     const int all = priority_rows(s, x->moves, stage, rows, own);
     nominals_extents(s, x->at.p, least);
+    for (int j = 0; j < s->nq; j++)
+        if (s->dimension[j] == s->angles) least[j] = 1;
     if (mechanism_residual(b, x->at, q, f) == FAILED) return initial_refused(x->s);
     for (int count = 0;; count++) {
         if (mechanism_evaluate(b, x->at, q, x->v0) == FAILED) return initial_refused(x->s);
