@@ -17,10 +17,12 @@ from typing import Any
 
 from ..model.alike import pattern
 from ..model.elements import Expr
-from .parts import Arguments, Value, owner_of
+from ..names import read
+from .parts import Arguments, Value
 
 SMALL = 60  # different nodes of one owner's values that are not worth a function
 DATA = "data"
+OF_JOINTS = frozenset(("angle", "position", "force", "torque"))  # what outputs and coordinates tell
 
 
 @dataclass
@@ -36,8 +38,11 @@ class Kind:
     owners: list[str] = field(default_factory=list)
     sources: list[tuple[Any, ...]] = field(default_factory=list)
     targets: list[tuple[int, ...]] = field(default_factory=list)
-    told: set[tuple[str, int]] = field(default_factory=set)
-    """Of each value that it writes the array, and which in its list."""
+
+    @property
+    def told(self) -> set[tuple[str, int]]:
+        """The array and the place of each value that it writes."""
+        return {pair for target in self.targets for pair in zip(self.writes, target, strict=True)}
 
 
 def kinds(
@@ -69,8 +74,7 @@ def kinds(
         kind.owners.append(owner)
         pairs = zip(alike.inputs, alike.groups, strict=True)
         kind.sources.append(tuple(place[s][1] if group else s for s, group in pairs))
-        kind.targets.append(tuple(k if v.at is None else v.at for _, k, v in own))
-        kind.told.update((array, k) for array, k, _ in own)
+        kind.targets.append(tuple(k for _, k, _ in own))
     return [_with_numbers(kind) for kind in kinds.values() if len(kind.owners) > 1]
 
 
@@ -119,10 +123,16 @@ def nodes_of(e: Expr, seen: Mapping[Expr, None]) -> dict[Expr, None]:
 
 
 def _owners(results: Mapping[str, Sequence[Value]]) -> dict[str, list[tuple[str, int, Value]]]:
-    """(array, which of its list, value) of each owner; of what is 0 or a number nothing."""
+    """(array, place in it, value) of each owner; of what is 0 or a number nothing."""
     found: dict[str, list[tuple[str, int, Value]]] = {}
     for array, group in results.items():
         for k, value in enumerate(group):
             if value.expression.free_symbols:
-                found.setdefault(owner_of(value.place), []).append((array, k, value))
+                found.setdefault(_owner(value.place), []).append((array, k, value))
     return found
+
+
+def _owner(place: str) -> str:
+    """A of "A.rx, b.omega.x", of "force.A.x [N]" and of "der(angle.A)"; b of "b.omega.x, b.omega.x"."""
+    first, *rest = read(place.partition(" [")[0].partition(", ")[0]).coordinate.split(".")
+    return rest[0] if rest and first in OF_JOINTS else first

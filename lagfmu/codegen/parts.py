@@ -5,7 +5,6 @@
 
 M is listed by the non-zeros of its lower triangle, G and B by their non-zeros, sorted by row, then column.  A
 tangent is the change of a function's results along a direction in t, q, v, u and p; d(x) is the change of x.
-An adjoint is the gradient of the sum of a function's results, each with a weight, by all of these but p.
 """
 
 from __future__ import annotations
@@ -13,7 +12,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from operator import itemgetter
 from typing import Any
 
 import sympy as sp
@@ -22,15 +20,13 @@ from ..mechanics.equations import TIME, EquationsOfMotion, formulas_of
 from ..mechanics.form import Form
 from ..mechanics.formulations.minimal import Reduction
 from ..mechanics.jumps import NONE, Jumps
-from ..model.differential import Differential, gradient
+from ..model.differential import Differential
 from ..model.elements import Expr
 from ..model.model import Constraint, Contact, Nonholonomic
 from ..model.units import ONE, SECOND, Unit
-from ..names import read
 from ..numeric.system import CONTACT, HOLONOMIC, NONHOLONOMIC, Friction, Row
 
 Arguments = Mapping[str, Sequence[Expr]]
-OF_JOINTS = frozenset(("angle", "position", "force", "torque"))  # what outputs and coordinates tell
 EMBED = "q = phi(s, t) and v = J sdot + dphi/dt."
 
 
@@ -40,8 +36,6 @@ class Value:
 
     expression: Expr
     place: str
-    at: int | None = None
-    """Where in its array it is added; None: it is set, at its own place in the list."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +70,7 @@ class Parts:
 
     `prefix` begins the names of all that is defined for it; `jumps`: those of its forces.  `reduction`: what
     leads from it to `full`, the equations of all coordinates.  `tangents`: its functions have them; `by`:
-    the names of parameters by which they are taken as well; `adjoints`: they have these too.
+    the names of parameters by which they are taken as well.
     """
 
     eom: EquationsOfMotion
@@ -88,7 +82,6 @@ class Parts:
     reduction: Reduction | None = None
     tangents: bool = False
     by: frozenset[str] = frozenset()
-    adjoints: bool = False
     time: Expr = TIME
 
     # ------------------------------------------------------------------------ patterns
@@ -266,7 +259,7 @@ class Parts:
         found += self._of_contacts()
         if self.tangents and (groups["energy"] or not eom.bare):
             text = "The change of all of these along the direction (dt, dq, dv, du, dp)."
-            found += self._derived("tangent", "adjoint", text, state, groups)
+            found.append(self._tangent("tangent", text, state, groups))
         if eom.lookups:
             places = values([x for _, x in eom.lookups], [s.name for s, _ in eom.lookups])
             found.append(
@@ -297,18 +290,14 @@ class Parts:
         yield Function("kinematics", "Rates B and drift b of  q' = B v + b.", still, results)
         if self.tangents:
             text = "Their change along the direction (dt, dq, du, dp)."
-            yield from self._derived(
-                "kinematics_tangent", "kinematics_adjoint", text, still, results
-            )
+            yield self._tangent("kinematics_tangent", text, still, results)
         if eom.unwrapped:
             angles = values([*eom.unwrapped.values()], [eom.q[j] for j in eom.unwrapped])
             text, told = "What angles equal modulo 2 pi.", {"angle": angles}
             yield Function("unwrapped_angles", text, still, told)
             if self.tangents:
                 text = "Their change along the direction (dt, dq, du, dp)."
-                yield from self._derived(
-                    "unwrapped_tangent", "unwrapped_adjoint", text, still, told
-                )
+                yield self._tangent("unwrapped_tangent", text, still, told)
 
     def _of_contacts(self) -> Iterator[Function]:
         """Restitution and Coulomb's law."""
@@ -352,7 +341,7 @@ class Parts:
         yield Function("outputs", text, arguments, results)
         if self.tangents:
             text = "Their changes along a direction, with those of what is solved for."
-            yield from self._derived("outputs_tangent", "outputs_adjoint", text, arguments, results)
+            yield self._tangent("outputs_tangent", text, arguments, results)
 
     @cached_property
     def embedding(self) -> list[Function]:
@@ -365,43 +354,8 @@ class Parts:
         found = [Function("embed", EMBED, state, results)]
         if self.tangents:
             text = "The change of q and v along the direction (dt, ds, dsdot, du, dp)."
-            found += self._derived("embed_tangent", "embed_adjoint", text, state, results)
+            found.append(self._tangent("embed_tangent", text, state, results))
         return found
-
-    def _derived(
-        self,
-        tangent: str,
-        adjoint: str,
-        doc: str,
-        arguments: Arguments,
-        results: Mapping[str, Sequence[Value]],
-    ) -> Iterator[Function]:
-        """The tangent of a function and, where it is asked for, its adjoint."""
-        yield self._tangent(tangent, doc, arguments, results)
-        if self.adjoints:
-            yield self._adjoint(adjoint, arguments, results)
-
-    def _adjoint(
-        self, name: str, arguments: Arguments, results: Mapping[str, Sequence[Value]]
-    ) -> Function:
-        weights = {f"w{a}": weights_of(a, len(group)) for a, group in results.items()}
-        spots = {
-            s: (f"g{a}", k)
-            for a, group in arguments.items()
-            for k, s in enumerate(group)
-            if a != "p" and s in self.change
-        }
-        terms: dict[str, list[tuple[Expr, Expr]]] = {}
-        for group, w in zip(results.values(), weights.values(), strict=True):
-            for x, weight in zip(group, w, strict=True):
-                terms.setdefault(owner_of(x.place), []).append((weight, x.expression))
-        found: dict[str, list[Value]] = {f"g{a}": [] for a in arguments if a != "p"}
-        for owner, sums in terms.items():
-            slopes = gradient(sums, spots)
-            for array, k, s in sorted(((*spots[s], s) for s in slopes), key=itemgetter(0, 1)):
-                found[array].append(Value(slopes[s], owner, k))
-        text = "Adds the gradient of the sum of all these values, each with a weight."
-        return Function(name, text, {**arguments, **weights}, found)
 
     def _tangent(
         self, name: str, doc: str, arguments: Arguments, results: Mapping[str, Sequence[Value]]
@@ -420,17 +374,6 @@ class Parts:
         return Function(name, doc, {**arguments, **along}, changes)
 
 
-def weights_of(array: str, count: int) -> tuple[Expr, ...]:
-    """What the values of an array are weighted with."""
-    return tuple(sp.Symbol(f"weight.{array}.{k}", real=True) for k in range(count))
-
-
-def owner_of(place: str) -> str:
-    """A of "A.rx, b.omega.x", of "force.A.x [N]" and of "der(angle.A)"; b of "b.omega.x, b.omega.x"."""
-    first, *rest = read(place.partition(" [")[0].partition(", ")[0]).coordinate.split(".")
-    return rest[0] if rest and first in OF_JOINTS else first
-
-
 def _or_zero(expressions: Any) -> list[Expr]:
     return [sp.S.Zero if e is None else e for e in expressions]
 
@@ -441,15 +384,14 @@ def parts_of(
     tangents: bool = False,
     time: Expr = TIME,
     by: frozenset[str] = frozenset(),
-    adjoints: bool = False,
 ) -> tuple[Parts, ...]:
     """The system of all coordinates and, where it is reduced, the one of those that are stepped.
 
     `form` and `jumps` as jumps.with_switch_states gives them; `time`: the symbol in them; `by`: parameters by
-    which tangents are taken as well; `adjoints`: of what has tangents.
+    which tangents are taken as well.
     """
     eom, reduction = form.equations, form.reduction
-    more: dict[str, Any] = {"tangents": tangents, "by": by, "adjoints": adjoints, "time": time}
+    more: dict[str, Any] = {"tangents": tangents, "by": by, "time": time}
     if reduction is None:
         return (Parts(eom, "", form.formulation, eom.constraints, jumps, **more),)
     reduced = reduction.reduced

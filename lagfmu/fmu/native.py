@@ -139,7 +139,9 @@ def sources_of(prepared: Prepared, listed: bool = True, face: Face = USUAL) -> S
     }
     gone |= generated.keys() | {file for file in everything if not face.holds(file)}
     if face.fmi == 3:
-        told = (*dependencies(table), arrays(table), not untold(table))
+        inside = arrays(table)
+        scalars = len(table.variables) - len(inside)
+        told = (scalars, *dependencies(table), inside, not untold(table))
         generated["interface.c"] = interface_source(scene.name, *told).encode()
     own = [f for f in everything if f.endswith(".c") and f not in gone]
     found = reached({**everything, **generated}, [*own, *generated])

@@ -3,19 +3,17 @@
     d e(a, b, ...) = de/da da + de/db db + ...
 
 Each node is differentiated once, and where nothing moves no term arises: the result is as sparse as the
-expression, and grows linearly with it.  `gradient` goes the other way, from the results back (reverse
-mode; Griewank & Walther, Evaluating Derivatives, 2008, sect. 3.2): all derivatives of a sum cost a few times
-the sum.
+expression, and grows linearly with it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Mapping
 
 import sympy as sp
 
 from ..errors import DerivationError
-from .attitude import Attitude, AttitudeChange, ClosedFunction
+from .attitude import ClosedFunction
 from .elements import Expr
 
 # their jumps are not differentiated
@@ -34,12 +32,11 @@ class Differential:
         """The change of e for the changes of the symbols in it."""
         found = self.known.get(e)
         if found is None:
-            found = self.along(e) if e.args else sp.S.Zero
+            found = self._of(e) if e.args else sp.S.Zero
             self.known[e] = found
         return found
 
-    def along(self, e: Expr) -> Expr:
-        """The same of a node by its parts, whose changes are asked for."""
+    def _of(self, e: Expr) -> Expr:
         if e.is_Add:
             return sp.Add(*(self(a) for a in e.args))
         if isinstance(e, ClosedFunction):
@@ -90,71 +87,7 @@ def _is_root(e: Expr) -> bool:
 
 
 class Share(sp.Function):  # type: ignore[misc]
-    """Share(w, e) = w e, and 0 where the weight w is 0, whatever e is: a root has no slope at 0."""
+    """Share(w, e) = w e, and 0 where the change w is 0, whatever e is: a root has no slope at 0."""
 
     is_real = True
     nargs = 2
-
-
-FINITE = (sp.Add, sp.Mul, sp.sin, sp.cos, sp.atan, sp.sign, sp.Abs, sp.Piecewise)
-
-
-def gradient(terms: Iterable[tuple[Expr, Expr]], by: Collection[Expr]) -> dict[Expr, Expr]:
-    """Of the sum of w e over the pairs (w, e): its derivative by each symbol of `by` that is in it."""
-    weights: dict[Expr, list[Expr]] = {}
-    moves: dict[Expr, bool] = {}
-    order: list[Expr] = []
-
-    def visit(e: Expr) -> bool:
-        if e not in moves:
-            inside = [visit(a) for a in _inside(e)]
-            moves[e] = e in by or any(inside)
-            order.append(e)
-        return moves[e]
-
-    for w, e in terms:
-        if visit(e):
-            weights.setdefault(e, []).append(w)
-    found = {}
-    for e in reversed(order):
-        if e not in weights:
-            continue
-        w = sp.Add(*weights.pop(e))
-        if e in by:
-            found[e] = w
-            continue
-        for a, rate in _rates(e, by, [a for a in _inside(e) if moves[a]]):
-            weights.setdefault(a, []).append(w * rate if _is_finite(rate, by) else Share(w, rate))
-    return found
-
-
-def _inside(e: Expr) -> Collection[Expr]:
-    """What a node is calculated from; of cases the symbols in them, since one alone holds."""
-    if isinstance(e, Attitude):
-        return e.quaternion
-    if isinstance(e, ClosedFunction):
-        return (e.opened(),)
-    return sorted(e.free_symbols, key=str) if isinstance(e, sp.Piecewise) else e.args
-
-
-def _rates(e: Expr, by: Collection[Expr], moving: Iterable[Expr]) -> Iterator[tuple[Expr, Expr]]:
-    """Those of `moving` among what a node is calculated from, with its derivative by each."""
-    if isinstance(e, sp.Piecewise):
-        cases = [(gradient([(sp.S.One, case.expr)], by), case.cond) for case in e.args]
-        for a in moving:
-            yield a, sp.Piecewise(*((g.get(a, sp.S.Zero), cond) for g, cond in cases))
-        return
-    for a in moving:
-        unit = {x: sp.S.One if x == a else sp.S.Zero for x in _inside(e)}
-        if isinstance(e, Attitude):
-            yield a, AttitudeChange(*e.args, *(unit[x] for x in e.quaternion)).opened()
-        else:
-            yield a, sp.S.One if isinstance(e, ClosedFunction) else Differential(unit).along(e)
-
-
-def _is_finite(e: Expr, by: Collection[Expr]) -> bool:
-    """True if it is a finite number wherever the symbols in it are."""
-    if not e.args or isinstance(e, ClosedFunction) or e.free_symbols.isdisjoint(by):
-        return True
-    known = isinstance(e, FINITE) or (e.is_Pow and e.exp.is_Integer and e.exp > 0)
-    return bool(known) and all(_is_finite(a, by) for a in e.args)

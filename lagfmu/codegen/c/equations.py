@@ -51,7 +51,7 @@ def model_source(
     """C text that defines MODEL_SYSTEM, the numeric form of the equations.
 
     `tangents`: with the derivatives that directional derivatives and radau5 need; `by`: parameters by which
-    they are taken as well; `adjoints`: with those of FMI 3.0 (None: it is another version).
+    they are taken as well; `adjoints`: they can be transposed, for FMI 3.0 (None: it is another version).
 
     Raises DerivationError if a function or a number has no counterpart in C.
     """
@@ -59,7 +59,7 @@ def model_source(
     given = form.equations
     symbols = _real([*given.q, *given.v, *given.u, *given.p, TIME])
     time = symbols.get(TIME, TIME)
-    whole = parts_of(_in_reals(form), jumps.mapped(symbols), tangents, time, by, bool(adjoints))
+    whole = parts_of(_in_reals(form), jumps.mapped(symbols), tangents, time, by)
     eom = whole[0].eom
     index = _index("coordinates", eom.q)
     if not eom.moves_plainly:
@@ -68,6 +68,8 @@ def model_source(
     if len(whole) > 1:
         index += _index("coordinates that are stepped", whole[-1].eom.q)
     text = "\n".join(piece for parts in whole for piece in (*_embedding(parts), _system(parts)))
+    if adjoints:
+        text += "".join(map(_adjoints, whole))
     text += POINTER.format(whole[-1].prefix)
     if adjoints is not None:
         text += ADJOINT.format(f"&{whole[-1].prefix}adjoints" if adjoints else "NULL")
@@ -158,9 +160,6 @@ def _embedding(parts: Parts) -> list[str]:
 
 
 def _define(f: Function, names: Mapping[Expr, str], prefix: str = "") -> str:
-    if f.name.endswith("adjoint"):
-        flat = [s for a, group in f.arguments.items() if a.startswith("w") for s in group]
-        names = {**names, **identifiers(flat, [*names.values()])}
     return function(prefix + f.name, f.doc, f.arguments, f.results, names)
 
 
@@ -175,7 +174,12 @@ def _system(parts: Parts) -> str:
     texts |= {f.name: _define(f, _reported(parts, names)) for f in own}
     tables = Tables(parts)
     text = tables.of_what_is_read if parts.eom.bare else tables.text
-    return "\n".join([*texts.values(), text(set(texts))]) + tables.adjoints(set(texts))
+    return "\n".join([*texts.values(), text(set(texts))])
+
+
+def _adjoints(parts: Parts) -> str:
+    known = (*parts.functions, *parts.embedding)
+    return Tables(parts).adjoints({f.name: f for f in known})
 
 
 def _bounds(parts: Parts, changing: Sequence[Expr]) -> str:

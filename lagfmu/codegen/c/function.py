@@ -76,7 +76,6 @@ def _in_loops(
 ) -> str:
     """A function for each kind of what is alike, one for the rest, and one that calls them."""
     told = {place for kind in found for place in kind.told}
-    adds = any(value.at is not None for group in results.values() for value in group)
     rest = {
         array: [None if (array, k) in told else value for k, value in enumerate(group)]
         for array, group in results.items()
@@ -102,7 +101,7 @@ def _in_loops(
         text = _define(title, {"a": kind.inputs}, ["y"], values, local)
         owners = " ".join(wrap(", ".join(kind.owners), 90, max_lines=1, placeholder=" ..."))
         parts.append(f"/* Of {owners}. */\n{text}")
-        calls += _loop(title, kind, arguments, names, data, adds)
+        calls += _loop(title, kind, arguments, names, data)
     used = {a for kind in found for a in (*kind.reads, *kind.writes)} | parameters
     used |= {*arguments, *results} if blocks else set()
     silence = _silence([a for a in (*arguments, *results) if a not in used])
@@ -128,9 +127,8 @@ def _loop(
     arguments: Mapping[str, Sequence[Expr]],
     names: Mapping[Expr, str],
     data: Mapping[Expr, int],
-    adds: bool,
 ) -> str:
-    """Calls of the function of a kind, for each of its owners; `adds`: to what is there."""
+    """Calls of the function of a kind, for each of its owners."""
     count, inputs, outputs = len(kind.owners), len(kind.reads), len(kind.writes)
     sources = [
         [data[x] if a == DATA else x for x, a in zip(source, kind.reads, strict=True)]
@@ -150,9 +148,8 @@ def _loop(
         scalar = array != DATA and _scalar(array, arguments[array], names)
         source = array if scalar else f"{array}[from[k][j]]"
         gather += f"            for (int j = {first}; j < {end}; j++) a[j] = {source};\n"
-    operator = "+=" if adds else "="
     for array, first, end in runs(kind.writes):
-        scatter += f"            for (int j = {first}; j < {end}; j++) {array}[to[k][j]] {operator} y[j];\n"
+        scatter += f"            for (int j = {first}; j < {end}; j++) {array}[to[k][j]] = y[j];\n"
     return (
         f"    {{\n{tables}        for (int k = 0; k < {count}; k++) {{\n"
         f"            double a[{inputs}], y[{outputs}];\n{gather}            {title}(a, y);\n"
@@ -250,10 +247,6 @@ def _statements(array: str, group: Sequence[Value | None]) -> Iterator[_Statemen
             k += 1
             continue
         value = one.expression
-        if one.at is not None:
-            yield _Statement(array, one.at, "+=", value, one.place)
-            k += 1
-            continue
         end = k + 1
         while end < len(group) and (other := group[end]) and other.expression == value:
             end += 1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from textwrap import wrap
 
 Dependencies = Mapping[int, Sequence[int]]  # value reference -> those it depends on, or holds
 HEAD = """/* interface.c -- {name}: what the unknowns of modelDescription.xml depend on, and what arrays hold,
@@ -13,60 +14,63 @@ HEAD = """/* interface.c -- {name}: what the unknowns of modelDescription.xml de
 
 #include "dependencies.h"
 
-static const unsigned POOL[] = {{{pool}}};
+static const unsigned HELD[] = {{
+{lists}
+}};
+static const unsigned INITIALLY[] = {{
+{initially}
+}};
+static const unsigned RUNNING[] = {{
+{running}
+}};
+static const unsigned HOLDING[] = {{
+{arrays}
+}};
 
-/* unknown, where its knowns begin, how many there are */
-static const Unknown INITIALLY[] = {{{initially}}};
-static const Unknown RUNNING[] = {{{running}}};
-static const Unknown HOLDING[] = {{{arrays}}};
-
+SHARED_VALUE const unsigned *const LISTS = HELD;
+SHARED_VALUE const unsigned *const INITIAL_LISTS = INITIALLY;
+SHARED_VALUE const unsigned *const RUNNING_LISTS = RUNNING;
 SHARED_VALUE const int DEPENDENCIES_TOLD = {told};
-SHARED_VALUE const unsigned *const KNOWNS = POOL;
-SHARED_VALUE const Unknowns INITIAL_UNKNOWNS = {{INITIALLY, {initial_count}}};
-SHARED_VALUE const Unknowns RUNNING_UNKNOWNS = {{RUNNING, {running_count}}};
-SHARED_VALUE const Unknowns ARRAYS = {{HOLDING, {array_count}}};
+SHARED_VALUE const unsigned *const ARRAY_LISTS = HOLDING;
+SHARED_VALUE const int ARRAY_COUNT = {array_count};
 """
 
 
 def interface_source(
-    name: str, initially: Dependencies, running: Dependencies, arrays: Dependencies, told: bool
+    name: str,
+    count: int,
+    initially: Dependencies,
+    running: Dependencies,
+    arrays: Dependencies,
+    told: bool,
 ) -> str:
-    """C text that defines the dependencies during the initialization, and after it, where they are `told`,
-    and what is in arrays.
+    """C text that defines the dependencies of `count` variables during the initialization, and after it,
+    where they are `told`, and what is in arrays.
 
     What depends on the same, or holds it, shares one list.
     """
-    pool: list[int] = []
-    begins: dict[tuple[int, ...], int] = {}
-    rows = [_rows(found, begins, pool) for found in (initially, running, arrays)]
-    texts = [_lines([f"{{{r}, {first}, {n}}}" for r, first, n in table]) for table in rows]
+    number: dict[tuple[int, ...], int] = {}
+    unknowns = [
+        [_number(found.get(k), number) for k in range(count)] for found in (initially, running)
+    ]
+    held = [_number(on, number) for on in arrays.values()]
+    lists = [_lines([len(on), *on]) for on in number]
     return HEAD.format(
         name=name,
-        pool=_lines([str(k) for k in pool] or ["0"]),
-        initially=texts[0] or "{0, 0, 0}",
-        running=texts[1] or "{0, 0, 0}",
-        initial_count=len(rows[0]),
-        running_count=len(rows[1]),
-        arrays=texts[2] or "{0, 0, 0}",
-        array_count=len(rows[2]),
+        lists=",\n".join(lists) or "    0",
+        initially=_lines(unknowns[0]),
+        running=_lines(unknowns[1]),
+        arrays=_lines(held or [0]),
+        array_count=len(held),
         told=int(told),
     )
 
 
-def _rows(
-    found: Dependencies, begins: dict[tuple[int, ...], int], pool: list[int]
-) -> list[tuple[int, int, int]]:
-    """(unknown, first, count) of each; what is new goes to the pool's end."""
-    rows = []
-    for reference, on in found.items():
-        knowns = tuple(on)
-        if knowns not in begins:
-            begins[knowns] = len(pool)
-            pool.extend(knowns)
-        rows.append((reference, begins[knowns], len(knowns)))
-    return rows
+def _number(on: Sequence[int] | None, number: dict[tuple[int, ...], int]) -> int:
+    """That of its list, which is new or there already; 0 of none."""
+    return 0 if on is None else number.setdefault(tuple(on), len(number) + 1)
 
 
-def _lines(parts: Sequence[str]) -> str:
-    """Eight to a line."""
-    return ",\n    ".join(", ".join(parts[k : k + 8]) for k in range(0, len(parts), 8))
+def _lines(values: Sequence[int]) -> str:
+    text = ", ".join(map(str, values))
+    return "\n".join(wrap(text, 96, initial_indent="    ", subsequent_indent="    "))

@@ -90,10 +90,8 @@ MATH = """
 """
 OURS = """
     t q v u p s sdot M F G nu gamma f h e energy dt dq dv du ds dsdot dM dF dG dnu dgamma df denergy fill
-    rates drift angle drates ddrift places shared blocks vdot Q dvdot dlambda dQ w dw other dother
+    rates drift angle drates ddrift dangle places shared blocks vdot Q dvdot dlambda dQ w dw other dother
     sign heaviside share cubic Cubic
-    wM wF wG wnu wgamma wf wenergy wrates wdrift wangle dangle wq wv ww wother
-    gt gq gv gs gsdot gu gvdot glambda gQ
     Kind Formulation Row System Plan Type Role Place Variable near far small interface
     linux unix i386 main Friction coefficients load normal
     data rotation rotation_change turned turned_change across across_change levers

@@ -3,16 +3,24 @@
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from textwrap import wrap
 from typing import Any
 
 from ...mechanics.equations import EquationsOfMotion
 from ...model.model import Nonholonomic
 from ...numeric.system import CONTACT
-from ..parts import Parts
+from ..columns import groups
+from ..parts import Function, Parts
 from . import elimination
 from . import solve as csolve
+
+TRANSPOSED = {  # what is taken along a direction at once
+    "motion": ("tangent", "kinematics_tangent"),
+    "unwrapped": ("unwrapped_tangent",),
+    "outputs": ("outputs_tangent",),
+    "embed": ("embed_tangent",),
+}
 
 
 class Tables:
@@ -26,8 +34,7 @@ class Tables:
         """A System of coordinates that are only read: names, and the energies if they are read."""
         names, fields = self._layout()
         own, more = self._outputs(functions)
-        known = sorted(name for name in functions if not name.endswith("adjoint"))
-        fields |= {name: f"{self.prefix}{name}" for name in known} | more
+        fields |= {name: f"{self.prefix}{name}" for name in sorted(functions)} | more
         lines = "".join(f"    .{name} = {value},\n" for name, value in fields.items())
         return f"{names}{own}static const System {self.prefix}equations = {{\n{lines}}};\n"
 
@@ -142,19 +149,15 @@ class Tables:
         lines = "".join(f"    .{name} = {value},\n" for name, value in fields.items())
         return "".join(tables) + f"static const System {p}equations = {{\n{lines}}};\n"
 
-    def adjoints(self, functions: Collection[str]) -> str:
-        """The Adjoint of those functions that are one; nothing without."""
-        p = self.prefix
-        found = {name: p + name for name in sorted(functions) if name.endswith("adjoint")}
-        if not found:
-            return ""
-        found = {
-            name.removesuffix("_adjoint").replace("adjoint", "equations"): value
-            for name, value in found.items()
-        }
-        found |= {"embed": "embed_adjoint", "full": "&adjoints"} if p else {}
-        lines = "".join(f"    .{name} = {value},\n" for name, value in found.items())
-        return f"\nstatic const Adjoint {p}adjoints = {{\n{lines}}};\n"
+    def adjoints(self, tangents: Mapping[str, Function]) -> str:
+        """The Adjoint of these: the groups of their columns."""
+        p, text, fields = self.prefix, "\n", {"full": "&adjoints" if self.prefix else "NULL"}
+        for field, names in TRANSPOSED.items():
+            if found := groups([tangents[name] for name in names if name in tangents]):
+                text += self._integers(f"{field}_groups", found)
+                fields[field] = f"{p}{field}_groups"
+        lines = "".join(f"    .{name} = {value},\n" for name, value in fields.items())
+        return f"{text}static const Adjoint {p}adjoints = {{\n{lines}}};\n"
 
     def _outputs(self, functions: Collection[str]) -> tuple[str, dict[str, Any]]:
         """Tables of the model's own outputs, and the System's fields that hold them."""

@@ -81,10 +81,11 @@ SHARED int component_serialize(Component *c, const Call *call, const void *state
 SHARED int component_deserialize(Component *c, const Call *call, const char *bytes, size_t size, void **state);
 
 /* component_derivatives.c: how variables change along a direction (seed of the knowns), and with time.  Can partial
- * derivatives be had now, and are all arrays there; has a variable some; where a known's change stands in the direction
- * (NULL: the log has why it is none). */
+ * derivatives be had now, and are all arrays there; has a variable some; a direction in which so far nothing changes;
+ * where a known's change stands in it (NULL: the log has why it is none). */
 SHARED int component_derivable(Component *c, const Call *call, int complete);
 SHARED int component_has_derivatives(const Variable *v);
+SHARED Direction component_no_direction(Component *c);
 SHARED double *component_known(Component *c, const Call *call, const Group *group, unsigned known, double change,
                                double *dt);
 SHARED int component_directional(Component *c, const Call *call, const Group *group, const unsigned unknowns[],

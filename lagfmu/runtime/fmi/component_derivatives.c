@@ -19,8 +19,8 @@ static double *known_place(Instance *x, const Variable *v, double *dt) {
     return j < nq ? &w->dq[j] : &w->dv[j - nq];
 }
 
-/* The direction in which everything is to change: so far nothing. */
-static Direction no_direction(Sensitivity *w) {
+Direction component_no_direction(Component *c) {
+    Sensitivity *w = &c->instance.solver.sensitivity;
     const System *s = MODEL_SYSTEM;
     memset(w->dq, 0, (size_t)s->nq * sizeof *w->dq);
     memset(w->dv, 0, (size_t)s->nv * sizeof *w->dv);
@@ -72,7 +72,7 @@ int component_directional(Component *c, const Call *call, const Group *group, co
     const int complete = (unknown_count == 0 || (unknowns != NULL && sensitivity != NULL)) &&
                          (known_count == 0 || (knowns != NULL && seed != NULL));
     if (component_derivable(c, call, complete) != CALL_OK) return CALL_ERROR;
-    Direction d = no_direction(&c->instance.solver.sensitivity);
+    Direction d = component_no_direction(c);
     for (size_t k = 0; k < known_count; k++) {
         double *change = component_known(c, call, group, knowns[k], seed[k], &d.dt);
         if (change == NULL) return CALL_ERROR;

@@ -4,20 +4,22 @@
 
 #include "linkage.h"
 
-/* The variable of that value reference depends on those of KNOWNS[first], ..., `count` of them. */
-typedef struct {
-    unsigned reference;
-    int first, count;
-} Unknown;
+/* Lists of value references one behind the other, each behind its length, numbered from 1. */
+SHARED const unsigned *const LISTS;
 
-typedef struct {
-    const Unknown *rows;
-    int count;
-} Unknowns;
-
+/* The number of the list of what each variable depends on, before the end of the initialization and after it; 0: it is
+ * no unknown of the model structure there. */
+SHARED const unsigned *const INITIAL_LISTS, *const RUNNING_LISTS;
 SHARED const int DEPENDENCIES_TOLD; /* 0: of a large mechanism they are left out: each may depend on all */
-SHARED const Unknowns INITIAL_UNKNOWNS, RUNNING_UNKNOWNS; /* before the end of the initialization, and after it */
-SHARED const Unknowns ARRAYS; /* likewise: what is in the array of that value reference, VARIABLE_COUNT and on */
-SHARED const unsigned *const KNOWNS;
+
+/* That of what each array holds, of the value references VARIABLE_COUNT and on. */
+SHARED const unsigned *const ARRAY_LISTS;
+SHARED const int ARRAY_COUNT;
+
+static inline const unsigned *list_at(unsigned number) {
+    const unsigned *list = LISTS;
+    while (--number > 0) list += 1 + *list;
+    return list;
+}
 
 #endif

@@ -54,6 +54,7 @@ static Status check_request(const char *function, fmi3String name, fmi3String to
 /* One block, which holds everything; NULL: no memory. */
 static Component3 *make(fmi3String name) {
     Instance draft;
+    Directions unplaced;
     Arena arena = {NULL, 0};
     const size_t name_size = strlen(name) + 1;
     memset(&draft, 0, sizeof draft);
@@ -61,6 +62,7 @@ static Component3 *make(fmi3String name) {
     (void)arena_take(&arena, name_size, 1);
     (void)arena_take(&arena, (size_t)VARIABLE_COUNT, 1);
     instance_layout(&draft, &arena);
+    if (MODEL_ADJOINT != NULL) adjoint_layout(&unplaced, &arena, MODEL_SYSTEM);
     arena = (Arena){calloc(1, arena.used), 0};
     if (arena.base == NULL) return NULL;
     Component3 *made = arena_take(&arena, 1, sizeof *made);
@@ -68,6 +70,7 @@ static Component3 *make(fmi3String name) {
     memcpy(kept, name, name_size);
     made->common.named = arena_take(&arena, (size_t)VARIABLE_COUNT, 1);
     instance_layout(&made->common.instance, &arena);
+    if (MODEL_ADJOINT != NULL) adjoint_layout(&made->directions, &arena, MODEL_SYSTEM);
     made->common.name = kept;
     made->common.send = log_of;
     made->common.allocate = calloc;

@@ -1,8 +1,6 @@
-/* fmi3_adjoint.c -- the gradient of a weighted sum of variables (section 2.2.11), at the cost of a few evaluations
- * however many knowns there are. */
+/* fmi3_adjoint.c -- the gradient of a weighted sum of variables (section 2.2.11) by one transposed solve. */
 #include <math.h>
 
-#include "adjoint.h"
 #include "digits.h"
 #include "fmi3_component.h"
 
@@ -45,13 +43,12 @@ static void weigh(Instance *x, const Variable *v, double weight, double *dt) {
 }
 
 /* What has no derivative has none along any direction: `undefined`, or NULL for another cause. */
-static Status check_defined(Instance *x, const fmi3ValueReference unknowns[], size_t count,
+static Status check_defined(Component *c, const fmi3ValueReference unknowns[], size_t count,
                             const Variable **undefined) {
-    Sensitivity *w = &x->solver.sensitivity;
+    Instance *x = &c->instance;
+    const Direction none = component_no_direction(c);
     double change;
     *undefined = NULL;
-    adjoint_clear(w, x->solver.system);
-    const Direction none = {0, w->dq, w->dv, w->du, w->dp};
     if (instance_differentiate_factored(x, none) != OK) return FAILED;
     for (size_t k = 0; k < count; k++) {
         if (instance_change(x, &VARIABLES[unknowns[k]], none, &change) == OK) continue;
@@ -62,28 +59,26 @@ static Status check_defined(Instance *x, const fmi3ValueReference unknowns[], si
 }
 
 /* The weights of what the sum of these variables depends on: in the sensitivity's direction, and *dt. */
-static Status find_gradient(Instance *x, const fmi3ValueReference unknowns[], const double weights[],
+static Status find_gradient(Component3 *c, const fmi3ValueReference unknowns[], const double weights[],
                             size_t count, double *dt) {
+    Instance *x = &c->common.instance;
     Solver *s = &x->solver;
     const System *full = s->system->full;
-    Sensitivity *stepped = &s->sensitivity, *w = &x->along;
-    const Instant at = x->at;
-    const double *q = s->state.q, *v = s->state.v;
-    adjoint_clear(stepped, s->system);
-    if (full != NULL) adjoint_clear(w, full);
-    *dt = 0;
+    Sensitivity *w = &s->sensitivity;
+    Directions *in = &c->directions;
+    Backward all = {.system = full, .of = MODEL_ADJOINT->full, .weights = &x->along, .along = &in->full, .in = in,
+                    .at = x->at, .seen = &x->seen, .q = x->seen.q, .v = x->seen.v};
+    Backward stepped = {.system = s->system, .of = MODEL_ADJOINT, .weights = w, .along = &in->stepped, .in = in,
+                        .at = x->at, .seen = full == NULL ? &x->seen : NULL, .q = s->state.q, .v = s->state.v};
+    if (full != NULL) adjoint_begin(&all, dt, w->du);
+    adjoint_begin(&stepped, dt, w->du);
     for (size_t k = 0; k < count; k++) weigh(x, &VARIABLES[unknowns[k]], weights[k], dt);
     if (full != NULL) {
-        Mechanism *solved = full->dynamics != NULL ? &s->full : NULL;
-        const Adjoint *of = MODEL_ADJOINT->full;
-        if (adjoint_back(w, solved, full, of, at, &x->seen, x->seen.q, x->seen.v, dt, stepped->du) != OK)
-            return FAILED;
-        MODEL_ADJOINT->embed(at.t, q, v, at.u, at.p, w->dq, w->dv, dt, stepped->dq, stepped->dv, stepped->du);
+        if (adjoint_back(&all, full->dynamics != NULL ? &s->full : NULL) != OK) return FAILED;
+        adjoint_embed(&stepped, &all);
     }
-    if (adjoint_back(stepped, &s->stepped, s->system, MODEL_ADJOINT, at, full != NULL ? NULL : &x->seen, q, v, dt,
-                     stepped->du) != OK)
-        return FAILED;
-    adjoint_settle(stepped, &s->stepped, MODEL_ADJOINT, at, q, dt);
+    if (adjoint_back(&stepped, &s->stepped) != OK) return FAILED;
+    adjoint_settle(&stepped, &s->stepped);
     return OK;
 }
 
@@ -124,9 +119,9 @@ fmi3Status fmi3GetAdjointDerivative(fmi3Instance instance, const fmi3ValueRefere
                    "which have no adjoint");
         return component_no_value(c);
     }
-    if (instance_factor(x) != OK || check_defined(x, unknowns, nUnknowns, &undefined) != OK)
+    if (instance_factor(x) != OK || check_defined(c, unknowns, nUnknowns, &undefined) != OK)
         return undefined != NULL ? component_no_derivative(c, call, undefined) : component_no_value(c);
-    if (find_gradient(x, unknowns, seed, nUnknowns, &dt) != OK) return component_no_value(c);
+    if (find_gradient(instance, unknowns, seed, nUnknowns, &dt) != OK) return component_no_value(c);
     for (size_t k = 0; k < nKnowns; k++) {
         const double *weight = component_known(c, call, &FLOAT64, knowns[k], 1, &dt);
         if (weight == NULL) return fmi3Error;

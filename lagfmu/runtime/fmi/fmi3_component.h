@@ -2,6 +2,7 @@
 #ifndef LAGFMU_FMI3_COMPONENT_H
 #define LAGFMU_FMI3_COMPONENT_H
 
+#include "adjoint.h"
 #include "component.h"
 #include "fmi3.h"
 #include "fmi3_calls.h"
@@ -12,6 +13,7 @@ typedef struct {
     fmi3LogMessageCallback log;
     fmi3IntermediateUpdateCallback update;
     int early; /* 1: a step may return before its end */
+    Directions directions;
 } Component3;
 
 /* The groups of variables that there are; fmi3_values.c. */

@@ -25,16 +25,16 @@ fmi3Status fmi3GetOutputDerivatives(fmi3Instance instance, const fmi3ValueRefere
 
 /* ------------------------------------------------------------------ dependencies */
 
-/* NULL: nothing is said of the variable, and the log has it. */
-static const Unknown *find_unknown(Component *c, const Call *call, fmi3ValueReference reference) {
-    const Unknowns *all = c->instance.running ? &RUNNING_UNKNOWNS : &INITIAL_UNKNOWNS;
+/* What a variable depends on, behind how many these are; NULL: nothing is said of it, and the log has it. */
+static const unsigned *find_list(Component *c, const Call *call, fmi3ValueReference reference) {
+    const unsigned *lists = c->instance.running ? RUNNING_LISTS : INITIAL_LISTS;
+    const int known = reference < (unsigned)VARIABLE_COUNT;
     Why text;
-    for (int k = 0; k < all->count; k++)
-        if (all->rows[k].reference == reference) return &all->rows[k];
+    if (DEPENDENCIES_TOLD && known && lists[reference] > 0) return list_at(lists[reference]);
     if (!DEPENDENCIES_TOLD)
         (void)fail(&text, "%s: this FMU is too large to say what its variables depend on, as modelDescription.xml "
                    "does not: take each to depend on all states and inputs", call->name);
-    else if (reference < (unsigned)VARIABLE_COUNT)
+    else if (known)
         (void)fail(&text, "%s: '%s' is none of the unknowns of the model structure here", call->name,
                    VARIABLES[reference].name);
     else
@@ -48,9 +48,9 @@ fmi3Status fmi3GetNumberOfVariableDependencies(fmi3Instance instance, fmi3ValueR
     const Call *call = FMI3_CALL(fmi3GetNumberOfVariableDependencies);
     if (component_forbids(instance, call)) return fmi3Error;
     if (nDependencies == NULL) return component_missing(instance, call);
-    const Unknown *unknown = find_unknown(instance, call, valueReference);
-    if (unknown == NULL) return fmi3Error;
-    *nDependencies = (size_t)unknown->count;
+    const unsigned *list = find_list(instance, call, valueReference);
+    if (list == NULL) return fmi3Error;
+    *nDependencies = *list;
     return fmi3OK;
 }
 
@@ -61,18 +61,18 @@ fmi3Status fmi3GetVariableDependencies(fmi3Instance instance, fmi3ValueReference
     const Call *call = FMI3_CALL(fmi3GetVariableDependencies);
     Why text;
     if (component_forbids(instance, call)) return fmi3Error;
-    const Unknown *unknown = find_unknown(instance, call, dependent);
-    if (unknown == NULL) return fmi3Error;
-    if (nDependencies != (size_t)unknown->count) {
-        (void)fail(&text, "%s: room for %lu dependencies, value reference %u has %d", call->name,
-                   (unsigned long)nDependencies, (unsigned)dependent, unknown->count);
+    const unsigned *list = find_list(instance, call, dependent);
+    if (list == NULL) return fmi3Error;
+    if (nDependencies != *list) {
+        (void)fail(&text, "%s: room for %lu dependencies, value reference %u has %u", call->name,
+                   (unsigned long)nDependencies, (unsigned)dependent, *list);
         return component_refuse(instance, text.text);
     }
     if (nDependencies > 0 && (elementIndicesOfDependent == NULL || independents == NULL ||
                               elementIndicesOfIndependents == NULL || dependencyKinds == NULL))
         return component_missing(instance, call);
     for (size_t k = 0; k < nDependencies; k++) {
-        const fmi3ValueReference on = KNOWNS[unknown->first + (int)k];
+        const fmi3ValueReference on = list[1 + k];
         elementIndicesOfDependent[k] = elementIndicesOfIndependents[k] = 0; /* all elements */
         independents[k] = on;
         dependencyKinds[k] = on == dependent ? fmi3Constant : fmi3Dependent; /* a state is itself */

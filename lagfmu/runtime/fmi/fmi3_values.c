@@ -42,10 +42,10 @@ static fmi3Status set(Component *c, const Call *call, const Group *group, const 
                    nValues);                                                                                  \
     }
 
-/* What is in an array; NULL of a scalar. */
-static const Unknown *array_at(fmi3ValueReference reference) {
+/* What is in an array, behind how much that is; NULL of a scalar. */
+static const unsigned *array_at(fmi3ValueReference reference) {
     const unsigned k = reference - (unsigned)VARIABLE_COUNT;
-    return reference >= (unsigned)VARIABLE_COUNT && k < (unsigned)ARRAYS.count ? &ARRAYS.rows[k] : NULL;
+    return reference >= (unsigned)VARIABLE_COUNT && k < (unsigned)ARRAY_COUNT ? list_at(ARRAY_LISTS[k]) : NULL;
 }
 
 /* Of an array all that is in it, in its place among the values. */
@@ -54,18 +54,18 @@ fmi3Status fmi3GetFloat64(fmi3Instance instance, const fmi3ValueReference valueR
     const Call *call = FMI3_CALL(fmi3GetFloat64);
     size_t expected = 0, at = 0;
     int status = CALL_OK;
-    if (ARRAYS.count == 0 || nValueReferences == 0 || valueReferences == NULL || values == NULL)
+    if (ARRAY_COUNT == 0 || nValueReferences == 0 || valueReferences == NULL || values == NULL)
         return get(instance, call, &FLOAT64, valueReferences, nValueReferences, values, nValues);
     for (size_t k = 0; k < nValueReferences; k++) {
-        const Unknown *array = array_at(valueReferences[k]);
-        expected += array == NULL ? 1 : (size_t)array->count;
+        const unsigned *array = array_at(valueReferences[k]);
+        expected += array == NULL ? 1 : *array;
     }
     if (component_forbids(instance, call) || component3_miscounts(instance, call, nValues, expected))
         return fmi3Error;
     for (size_t k = 0; k < nValueReferences && status == CALL_OK; k++) {
-        const Unknown *array = array_at(valueReferences[k]);
-        const unsigned *held = array == NULL ? &valueReferences[k] : &KNOWNS[array->first];
-        const size_t count = array == NULL ? 1 : (size_t)array->count;
+        const unsigned *array = array_at(valueReferences[k]);
+        const unsigned *held = array == NULL ? &valueReferences[k] : array + 1;
+        const size_t count = array == NULL ? 1 : *array;
         status = component_get(instance, call, &FLOAT64, held, count, values + at);
         at += count;
     }

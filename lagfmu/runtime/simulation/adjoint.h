@@ -1,9 +1,9 @@
 /* adjoint.h -- the derivatives of one sum of weighted variables by everything that they depend on, at once.
  *
- * Backwards through what sensitivity.c does forwards (reverse mode; Griewank & Walther, Evaluating Derivatives, 2008,
- * ch. 3): each array of changes in a Sensitivity holds what the sum changes by with them, their weights.  From those of
- * variables follow those of accelerations and multipliers, from these (one transposed solve) those of M, F, G, ..., and
- * from these those of the state, of the inputs and of time. */
+ * Backwards through what sensitivity.c does forwards (Griewank & Walther, Evaluating Derivatives, 2008, ch. 3): each
+ * array of changes in a Sensitivity holds what the sum changes by with them, their weights.  From those of variables
+ * follow those of accelerations and multipliers, from these (one transposed solve) those of M, F, G, ..., and from these
+ * those of the state, of the inputs and of time. */
 #ifndef LAGFMU_ADJOINT_H
 #define LAGFMU_ADJOINT_H
 
@@ -11,38 +11,62 @@
 #include "outputs.h"
 #include "sensitivity.h"
 
-/* Of a system's functions: each adds, to what is there, the gradient of the sum of its weighted (w) results. */
+/* Of a system's tangents, for each of their columns (t, q, v, u, of outputs vdot, lambda, Q too) the number of its group:
+ * no result depends on two columns of a group (Curtis, Powell & Reid 1974), but for the energies, which depend on all.
+ * NULL: each is one by itself. */
 typedef struct Adjoint {
-    void (*equations)(double t, const double *q, const double *v, const double *u, const double *p, const double *wM,
-                      const double *wF, const double *wG, const double *wnu, const double *wgamma, const double *wf,
-                      const double *wenergy, double *gt, double *gq, double *gv, double *gu);
-    void (*kinematics)(double t, const double *q, const double *u, const double *p, const double *wrates,
-                       const double *wdrift, double *gt, double *gq, double *gu);
-    void (*unwrapped)(double t, const double *q, const double *u, const double *p, const double *wangle, double *gt,
-                      double *gq, double *gu);
-    void (*outputs)(double t, const double *q, const double *v, const double *u, const double *p, const double *vdot,
-                    const double *lambda, const double *Q, const double *ww, const double *wother, double *gt,
-                    double *gq, double *gv, double *gu, double *gvdot, double *glambda, double *gQ);
-    void (*embed)(double t, const double *s, const double *sdot, const double *u, const double *p, const double *wq,
-                  const double *wv, double *gt, double *gs, double *gsdot, double *gu);
-    const struct Adjoint *full; /* of the system of all coordinates */
+    const int *motion, *unwrapped, *outputs, *embed; /* motion: of `tangent` and `kinematics_tangent` */
+    const struct Adjoint *full;                      /* of the system of all coordinates */
 } Adjoint;
 
 SHARED const Adjoint *const MODEL_ADJOINT; /* of model.c; NULL in an FMU without derivatives */
 
-SHARED void adjoint_clear(Sensitivity *w, const System *s);
+/* Neighbouring columns or results of a tangent: their changes along a direction, their gradients or weights. */
+typedef struct {
+    double *change, *weight;
+    int count;
+} Block;
+
+enum { COLUMN_BLOCKS = 7, RESULT_BLOCKS = 11 };
+
+/* One direction with what changes along it, in a system and in that of all coordinates; the results of a tangent along it;
+ * where the gradients are by the columns of a group. */
+typedef struct {
+    Sensitivity stepped, full;
+    double *first, **member;
+} Directions;
+
+/* A system at its latest motion. */
+typedef struct {
+    const System *system;
+    const Adjoint *of;
+    Sensitivity *weights, *along;
+    Directions *in;
+    Instant at;
+    Observed *seen; /* NULL where its outputs are not of this system */
+    const double *q, *v;
+    double time; /* its change */
+    Block column[COLUMN_BLOCKS], result[RESULT_BLOCKS];
+} Backward;
+
+SHARED void adjoint_layout(Directions *in, Arena *arena, const System *s);
+
+/* All weights 0; the gradients by time and inputs, to which the system of all coordinates adds too, in dt and du. */
+SHARED void adjoint_begin(Backward *x, double *dt, double *du);
 
 /* The weights of variables, but those of single outputs, which are in w->down. */
 SHARED void adjoint_weigh_share(Sensitivity *w, const Mechanism *b, int e, double weight);
 SHARED void adjoint_weigh_slip(Sensitivity *w, const Mechanism *b, int k, double weight, const double *v);
 SHARED void adjoint_weigh_acceleration(Sensitivity *w, const Mechanism *b, int k, double weight);
 
-/* Backwards from these to w->dq, w->dv, du (inputs) and *dt, through the latest motion of `b`, NULL where nothing is
- * solved for.  Behind it w->dgiven holds the weights of multipliers that are given. */
-SHARED Status adjoint_back(Sensitivity *w, Mechanism *b, const System *s, const Adjoint *of, Instant at, Observed *o,
-                           const double *q, const double *v, double *dt, double *du);
+/* Backwards from these to those of q, v, inputs and time, through the latest motion of `b`, NULL where nothing is solved
+ * for.  Behind it w->dgiven holds the weights of multipliers that are given. */
+SHARED Status adjoint_back(Backward *x, Mechanism *b);
+
+/* Backwards from q and v of all coordinates to those that are stepped. */
+SHARED void adjoint_embed(Backward *x, const Backward *full);
 
 /* Behind that, what is left of w->dq where the states that are set are settled: as kinematics.h's settle_along(). */
-SHARED void adjoint_settle(Sensitivity *w, Mechanism *b, const Adjoint *of, Instant at, const double *q, double *dt);
+SHARED void adjoint_settle(Backward *x, Mechanism *b);
 
 #endif
