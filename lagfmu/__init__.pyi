@@ -1,6 +1,6 @@
 """Lagrange's equations with multipliers, from SymPy to FMUs that report the forces of constraint."""
 
-from .api import build_fmu, show, verify
+from .api import build_fmu, show
 from .errors import LagfmuError, VerificationError
 from .live.command import play
 from .mechanics.equations import EquationsOfMotion, derive
@@ -48,6 +48,7 @@ from .study.sweep.sweep import sweep
 from .verification.check import Verification
 from .verification.result import Result
 from .verification.simulate import simulate
+from .verification.verify import verify
 
 __all__ = [
     "Arrow",

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import io
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
-from typing import Any
 
 from rich.console import Console
 
@@ -17,7 +16,7 @@ from .fmu.compiler import HOST, chosen, host
 from .fmu.face import USUAL, Face
 from .fmu.native import try_start
 from .fmu.target import NATIVE, PYTHON
-from .fmu.write import as_fmu, put, write
+from .fmu.write import put, write
 from .live.icon import icon
 from .live.playable import playable
 from .live.render import render
@@ -34,7 +33,7 @@ from .study.tradeoff.choose import Choice, Tick, choose
 from .study.tradeoff.page import section
 from .verification.check import Verification
 from .verification.crosscheck import layered
-from .verification.verify import verify as verify_fmu
+from .verification.verify import verify
 
 
 @dataclass(frozen=True)
@@ -129,27 +128,6 @@ def show(model: Model | str | os.PathLike[str], scene: Scene | str | None = None
     return Shown(prepared, try_start(prepared))
 
 
-def verify(
-    source: Model | str | os.PathLike[str],
-    start_values: Mapping[str, Any] | None = None,
-    stop_time: float | None = None,
-    step_size: float | None = None,
-    tolerance: float | None = None,
-    inputs: Any = None,
-    reference: Any = None,
-    statements: str | os.PathLike[str] | None = None,
-    *,
-    closed_forms: Sequence[ClosedForm | Conserved] = (),
-    scene: Scene | str | None = None,
-) -> Verification:
-    """verification.verify.verify() of an FMU; a model, or a model file with its closed forms, is built first
-    (natively where a compiler is at hand)."""
-    with as_fmu(source, scene, closed_forms) as fmu:
-        return verify_fmu(
-            fmu, start_values, stop_time, step_size, tolerance, inputs, reference, statements
-        )
-
-
 def package(
     prepared: Prepared,
     out: str | os.PathLike[str],
@@ -174,7 +152,7 @@ def package(
         prepared, out, closed_forms, target, platforms, told, live, sources, face, icon(prepared)
     )
     runs_here = target == PYTHON or host() in chosen(platforms)
-    found = verify_fmu(path) if check and runs_here else None
+    found = verify(path) if check and runs_here else None
     more = layered(path, found) if reference and runs_here else {}
     if found is not None or more:
         put(path, more, found.rows() if found is not None else ())

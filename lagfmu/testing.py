@@ -26,7 +26,6 @@ from .fmu.closed_forms import CarriedForm, carried, pack_closed_forms, unpack_cl
 from .fmu.compiler import NAMES, PLATFORMS, chosen, compile_libraries, find_compiler, host
 from .fmu.description import model_description
 from .fmu.description3 import build_description
-from .fmu.exchange import by_fmpy
 from .fmu.face import Face
 from .fmu.native import GENERATED, sources_of
 from .fmu.read import (
@@ -131,7 +130,7 @@ from .study.sweep.design import axis, design, distribution, sampled
 from .study.sweep.parts import PartWarning
 from .study.sweep.process import SessionProcess
 from .study.sweep.table import happened
-from .study.tradeoff.choose import bisected, choose
+from .study.tradeoff.choose import choose
 from .study.tradeoff.held_out import other_values
 from .study.tradeoff.measure import Plan as TradeoffPlan
 from .study.tradeoff.measure import Point, Tradeoff, measure

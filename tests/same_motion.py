@@ -14,7 +14,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
+import fmpy
 import numpy as np
+from fmpy.fmi1 import FMICallException
 
 from lagfmu.testing import (
     Bench,
@@ -23,7 +25,6 @@ from lagfmu.testing import (
     RefusalError,
     Run,
     Session,
-    by_fmpy,
     departures,
     session_of,
 )
@@ -121,13 +122,25 @@ def compared(bench: Bench) -> Finding:
 
 def _at(bench: Bench, right: Run, tolerance: float) -> Finding:
     facts = bench.facts
-    names, step = [v.name for v in facts.outputs], facts.stop_time / POINTS
-    kind, stop = "ModelExchange", facts.stop_time
-    run = by_fmpy(bench.folder, facts.description, stop, step, tolerance, read=names, kind=kind)
-    bench.session.renew()  # fmpy's logger is one a process
-    if run.refusal is not None:
-        raise RefusalError(kind, run.refusal.status, run.refusal.message)
-    found = run.rows
+    names = [v.name for v in facts.outputs]
+    said: list[str] = []
+    try:
+        found = fmpy.simulate_fmu(
+            str(bench.folder),
+            validate=False,
+            fmi_type="ModelExchange",
+            model_description=facts.description,
+            stop_time=facts.stop_time,
+            output_interval=facts.stop_time / POINTS,
+            relative_tolerance=tolerance,
+            record_events=False,
+            output=names,
+            logger=lambda *told: said.append(told[-1].decode()) if told[-3] > 1 else None,
+        )
+    except FMICallException as error:
+        raise RefusalError(error.function, error.status, "; ".join(said)) from None
+    finally:
+        bench.session.renew()  # fmpy's logger is one a process
     rows = np.zeros(len(found), right.rows.dtype)
     for name in rows.dtype.names or ():
         rows[name] = found[name] if name in names else right.rows[name][: len(found)]

@@ -16,7 +16,7 @@ from lagfmu import classify
 
 HOUSE = Path(lagfmu.__file__).parent
 TIMED = ("study", "cli", "verification", "api.py", "page")  # they report what a run has cost
-RUNS = ("fmu/session.py", "fmu/exchange.py")  # they measure it
+RUNS = ("fmu/session.py",)  # they measure it
 A_LOGGER_A_THREAD = ("fmu/binary.py",)
 A_BROWSER_TO_START = ("report/firefox.py",)
 CLOCKS = {"time", "timeit", "signal", "threading", "resource"}

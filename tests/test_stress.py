@@ -81,20 +81,17 @@ def judged(bench, change):
     return [c.what for c in bench.checks(replace(bench.ordinary, rows=rows)) if c.ratio > 1]
 
 
-def test_the_hemisphere_is_never_wrong(native_fmu, tmp_path):
-    """Every quick probe is right or refused; the summary is a table and a JSON file."""
+def test_the_hemisphere_is_never_wrong(native_fmu):
+    """Every quick probe is right or refused; the summary is a table."""
     text = io.StringIO()
-    (tried,) = stress(
-        [native_fmu("Hemisphere")], tmp_path, Console(file=text), quick=True, limit=60.0
-    )
+    (tried,) = stress([native_fmu("Hemisphere")], Console(file=text), quick=True, limit=60.0)
     found = tried.found
     assert [r for r in found.rows if r.verdict in (WRONG, UNFINISHED)] == []
     assert sum(r.verdict == RIGHT for r in found.rows) > 25
     assert not any(r.worry for r in found.rows)
     families = {"parameters", "starts", "communication step", "tolerance", "method", "long run"}
     assert families <= {r.family for r in found.rows}
-    data = json.loads((tmp_path / "native" / "Hemisphere.json").read_text())
-    assert [data["verdicts"][v] for v in VERDICTS] == found.counts()[1:-2]
+    assert [tried.data["verdicts"][v] for v in VERDICTS] == found.counts()[1:-2]
     assert "Hemisphere (native)" in text.getvalue()
 
 
@@ -303,7 +300,7 @@ def test_a_crash_is_one_wrong_row(native_fmu, tmp_path):
     """A probe that takes the process down is wrong, one that hangs is unfinished, the rest goes on; JSON and
     JUnit say the same, and a file that is missing is an error of its own: exit code 3, the worst of all."""
     xml, data, fmu = tmp_path / "out.xml", tmp_path / "out.json", str(native_fmu("Hemisphere"))
-    words = ["stress", fmu, "--quick", "--limit", "1", "--out", str(tmp_path / "out")]
+    words = ["stress", fmu, "--quick", "--limit", "1"]
     files = ["--junit", str(xml), "--json", str(data)]
     done = CliRunner().invoke(app, [*words, str(tmp_path / "gone.fmu"), *files])
     assert done.exit_code == NOT_RUN
@@ -317,13 +314,12 @@ def test_a_crash_is_one_wrong_row(native_fmu, tmp_path):
     assert second.get("errors") == "1"
 
 
-def test_what_cannot_be_meant_is_wrong_usage(tmp_path):
-    """A time limit of 0 s, a scene that no file has: exit code 2, and nothing is built."""
+def test_what_cannot_be_meant_is_wrong_usage():
+    """A time limit of 0 s, a scene that no file has: exit code 2."""
     model = str(MODELS / "hemisphere.py")
     for words in ([model, "--limit", "0"], [model, "--scene", "Nobody"]):
-        done = CliRunner().invoke(app, ["stress", *words, "--out", str(tmp_path / "out")])
+        done = CliRunner().invoke(app, ["stress", *words])
         assert done.exit_code == WRONG_USAGE
-    assert not (tmp_path / "out").exists()
 
 
 def test_a_scale_of_a_difference_is_none_of_its_magnitudes(bench):
@@ -401,8 +397,9 @@ def test_rates_that_an_fmu_estimates_are_read_by_the_judge(tmp_path):
     """A cam whose angle alone is given, a contact with a table, friction: nothing is wrong, and the laws that
     need the angle's rates are held against those that the FMU reports."""
     model = UNSEEN / "cam.py"
-    arguments = ["stress", str(model), "--target", "native", "--quick", "--out", str(tmp_path)]
+    file = tmp_path / "cam.json"
+    arguments = ["stress", str(model), "--target", "native", "--quick", "--json", str(file)]
     assert CliRunner().invoke(app, arguments).exit_code == 0
-    data = json.loads((tmp_path / "native" / "Cam.json").read_text())
+    (data,) = json.loads(file.read_text())
     assert data["verdicts"][WRONG] == 0
     assert data["verdicts"][RIGHT] > 5

@@ -101,6 +101,21 @@ Settings = Annotated[
     Names,
     typer.Option("--set", metavar="NAME=VALUE", help="A parameter or start value; repeatable."),
 ]
+Runnable = Annotated[Path, typer.Argument(help="An FMU, or a model file.")]
+Runnables = Annotated[
+    list[Path], typer.Argument(metavar="MODEL.py|FILE.fmu...", help="Model files and FMUs.")
+]
+SceneName = Annotated[
+    str | None, typer.Option(help="Which FMU of a model file (default: its first).")
+]
+SceneNames = Annotated[Names, typer.Option(help="Only these FMUs of model files; repeatable.")]
+Plot = Annotated[Path | None, typer.Option("--plot", help="Write a figure: .svg, .png or .pdf.")]
+ReferenceFile = Annotated[
+    Path | None, typer.Option(help="CSV of reference results to compare with.")
+]
+StatementsFile = Annotated[
+    Path | None, typer.Option(help="TOML of statements that must hold, for any FMU.")
+]
 JsonFile = Annotated[Path | None, typer.Option(help="Write everything as JSON.")]
 JunitFile = Annotated[Path | None, typer.Option(help="Write JUnit XML, one suite for each FMU.")]
 Tolerance = Annotated[

@@ -17,7 +17,7 @@ from rich.console import Console
 from ..errors import BuildError, UsageError
 from ..fmu.archive import unpack
 from ..fmu.target import target_of
-from ..fmu.write import write, write_whole
+from ..fmu.write import write
 from ..model.file import ModelFile
 from ..model.scene import Scene
 from ..prepare.prepare import prepare
@@ -26,10 +26,9 @@ from ..study.stress.facts import facts_of
 from ..study.stress.lagrange import lay_beside
 from ..study.stress.probe import UNFINISHED, WRONG, Probe, Verdict
 from ..study.stress.probes import probes
-from ..study.stress.report import MEANING, Stressed, data, report, summary, table
-from ..verification.junit import Report, text_of
+from ..study.stress.report import MEANING, Stressed, report, summary, table
+from ..verification.junit import Report
 from .progress import progress
-from .terminal import say_wrote
 from .works import studied
 
 WORKER = "lagfmu.study.stress.worker"
@@ -39,7 +38,6 @@ WIDTH = 110  # of tables that go into a file
 
 def stress(
     paths: Sequence[Path],
-    out: Path,
     console: Console,
     target: str | None = None,
     scenes: Sequence[str] = (),
@@ -47,7 +45,7 @@ def stress(
     *,
     limit: float,
 ) -> list[Report]:
-    """Probe model files and FMUs, print tables, write OUT/TARGET/NAME.json.
+    """Probe model files and FMUs, print tables.
 
     What cannot be built or run does not keep the others from it.  Raises UsageError.
     """
@@ -57,7 +55,7 @@ def stress(
         console = Console(file=console.file, width=WIDTH, emoji=False)
 
     def study(name: str, fmu: Path) -> Report:
-        return report(name, _one(fmu, out, console, quick, limit))
+        return report(name, _one(fmu, console, quick, limit))
 
     kind = target_of(target)
     with tempfile.TemporaryDirectory(prefix="lagfmu_") as folder:
@@ -79,15 +77,12 @@ def build(file: ModelFile, scene: Scene, folder: Path, target: str, console: Con
         return fmu
 
 
-def _one(fmu: Path, out: Path, console: Console, quick: bool, limit: float) -> Stressed:
+def _one(fmu: Path, console: Console, quick: bool, limit: float) -> Stressed:
     facts = facts_of(fmu)
     rows = _probe(fmu, probes(facts, quick), console, quick, limit)
     digest = hashlib.sha256(fmu.read_bytes()).hexdigest()
     one = Stressed(facts.name, facts.target, digest, quick, limit, bool(facts.laws), tuple(rows))
     console.print(table(one))
-    stem = out / one.target / one.name
-    write_whole(stem.with_suffix(".json"), text_of(data(one)).encode())
-    say_wrote(stem.with_suffix(".json"), on=console)
     return one
 
 

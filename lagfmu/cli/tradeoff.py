@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from rich.console import Console
 
 from ..errors import UsageError
 from ..fmu.read import target_in
 from ..fmu.target import PYTHON, target_of
-from ..fmu.write import write, write_whole
+from ..fmu.write import write
 from ..methods import INTEGRATORS, unknown
 from ..model.file import ModelFile
 from ..model.scene import Scene
@@ -22,9 +22,8 @@ from ..prepare.prepare import prepare
 from ..study.tradeoff.choose import Choice
 from ..study.tradeoff.figure import draw
 from ..study.tradeoff.measure import DECADES, Plan, Tradeoff, measure
-from ..study.tradeoff.observe import opened
-from ..study.tradeoff.report import data, remarks, report, table
-from ..verification.junit import Report, text_of
+from ..study.tradeoff.report import remarks, report, table
+from ..verification.junit import Report
 from .progress import progress
 from .terminal import say, say_wrote
 from .works import studied
@@ -42,7 +41,7 @@ def compare(
     scenes: Sequence[str] = (),
     full: bool = False,
 ) -> list[Report]:
-    """Measure model files and FMUs, print tables, write OUT/TARGET/NAME.json, .svg and .png.
+    """Measure model files and FMUs, print tables, draw OUT/TARGET/NAME.svg.
 
     `full`: every decade.
     What cannot be built or run does not keep the others from it.  Raises UsageError.
@@ -63,39 +62,31 @@ def compare(
                 return write(prepare(file.model, scene), folder, file.closed_forms, kind)
 
         def study(name: str, fmu: Path) -> Report:
-            with opened(fmu) as session:
-                plan = Plan(communication or session.experiment.step_size)
+            asked: dict[str, Any] = {}
             if target_in(fmu) == PYTHON:  # a run takes long
-                plan = replace(plan, halvings=2, repeats=1)
+                asked |= {"halvings": 2, "repeats": 1}
             if full:
-                plan = replace(plan, tolerances=DECADES, budget=20.0, limit=3.0)
+                asked |= {"tolerances": DECADES, "budget": 20.0, "limit": 3.0}
             if tolerances:
-                plan = replace(plan, tolerances=tuple(sorted(set(tolerances), reverse=True)))
+                asked["tolerances"] = tuple(sorted(set(tolerances), reverse=True))
             if methods:
-                plan = replace(plan, methods=tuple(methods))
+                asked["methods"] = tuple(methods)
             if repeats:
-                plan = replace(plan, repeats=repeats)
-            return _one(name, fmu, plan, out, console)
+                asked["repeats"] = repeats
+            with progress(console, fmu.stem) as tick:
+                one = measure(fmu, Plan(communication or 0.0, **asked), tick)
+            if one.points:
+                _show(one, out, console)
+            return report(name, one)
 
         return studied(paths, scenes, build, study)
-
-
-def _one(name: str, fmu: Path, plan: Plan, out: Path, console: Console) -> Report:
-    with progress(console, fmu.stem) as tick:
-        one = measure(fmu, plan, tick)
-    if one.points:
-        _show(one, out, console)
-    return report(name, one)
 
 
 def _show(one: Tradeoff, out: Path, console: Console) -> None:
     print_whole(console, table(one))
     for line in remarks(one):
         say(f"  {line}", on=console)
-    stem = out / one.target / one.name
-    write_whole(stem.with_suffix(".json"), text_of(data(one)).encode())
-    draw(one, [stem.with_suffix(".svg"), stem.with_suffix(".png")])
-    say_wrote(stem, ".json, .svg, .png", on=console)
+    say_wrote(draw(one, out / one.target / f"{one.name}.svg"), on=console)
 
 
 def say_chosen(choice: Choice, console: Console) -> None:

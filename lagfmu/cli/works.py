@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -10,8 +10,6 @@ from ..errors import LagfmuError, UsageError
 from ..model.file import ModelFile, load
 from ..model.scene import Scene
 from ..verification.junit import Report, refused
-
-Make = Callable[[], Path]
 
 
 def studied(
@@ -25,33 +23,25 @@ def studied(
     What cannot be built or run does not keep the others from it.  Raises UsageError.
     """
     done = []
+
+    def tried(name: str, make: Callable[[], Path]) -> None:
+        try:
+            done.append(study(name, make()))
+        except LagfmuError as error:
+            done.append(refused(name, error))
+
     for path in paths:
-        for name, make in _works(path, scenes, build):
-            try:
-                done.append(study(name, make()))
-            except LagfmuError as error:
-                done.append(refused(name, error))
+        if path.suffix != ".py":
+            tried(str(path), partial(Path, path))
+            continue
+        try:
+            file = load(path)
+        except LagfmuError as error:
+            done.append(refused(str(path), error))
+            continue
+        for scene in file.scenes:
+            if not scenes or scene.name in scenes:
+                tried(f"{path} ({scene.name})", partial(build, file, scene))
     if not done:
         raise UsageError(f"no FMU is called {', '.join(scenes) or 'anything'}")
     return done
-
-
-def _works(
-    path: Path, scenes: Sequence[str], build: Callable[[ModelFile, Scene], Path]
-) -> Iterator[tuple[str, Make]]:
-    """What is to be studied, by name, and what makes its FMU or raises LagfmuError."""
-    if path.suffix != ".py":
-        yield str(path), partial(Path, path)
-        return
-    try:
-        file = load(path)
-    except LagfmuError as error:
-        yield str(path), partial(_refuse, error)
-        return
-    for scene in file.scenes:
-        if not scenes or scene.name in scenes:
-            yield f"{path} ({scene.name})", partial(build, file, scene)
-
-
-def _refuse(error: LagfmuError) -> Path:
-    raise error

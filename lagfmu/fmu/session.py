@@ -1,8 +1,7 @@
 """THE loop that runs an FMU: a session loads it once, and initializes, sets, steps and reads it by names.
 
 Any FMU of FMI 2.0 with co-simulation will do, and a prepared model, whose slave then runs in this process.
-Many runs in one call: batch.py.  FMUs without co-simulation, and of other versions of FMI, are stepped by
-fmpy: exchange.py.
+Many runs in one call: batch.py.
 """
 
 from __future__ import annotations

@@ -9,22 +9,18 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .. import names
 from ..errors import SettingError, SimulationError
 from ..fmu import native
-from ..fmu.exchange import by_fmpy
 from ..fmu.inputs import check_inputs, columns_at, jumps
 from ..fmu.read import (
     Trajectory,
     communication_points,
-    described_rules,
-    experiment_of,
     has_error_bars,
-    obstacle,
     read_description,
     target_in,
 )
@@ -40,13 +36,15 @@ from ..fmu.write import as_built
 from ..interface.rules import problems_of
 from ..model.file import in_scene
 from ..model.model import Model
-from ..model.rule import Rule
 from ..model.scene import Scene
 from ..numeric.start_priority import LEFT_OUT
 from ..numeric.tolerance import tolerance_problem
 from ..prepare.prepare import Prepared, prepare
 from ..prepare.starts import tell
 from .result import Result
+
+if TYPE_CHECKING:
+    from ..fmu.inprocess import InProcess
 
 STARTS = re.compile(rf"start value .* misses the constraints|{LEFT_OUT}")  # a message of a move
 BARS = "error bars"  # begins a message of them
@@ -112,7 +110,7 @@ def simulate(
             "lagfmu build --error-bars"
         )
     units = {v.name: v.unit for v in description.modelVariables if v.unit}
-    rows = _of_fmu(path, repr(str(path)), description, asked)
+    rows = _ran(path, repr(str(path)), asked)
     return Result(rows, units, description.modelName, target_in(path))
 
 
@@ -133,34 +131,28 @@ def _of_model(prepared: Prepared, target: str, asked: _Asked) -> Result:
     if target == PYTHON:
         from ..fmu.inprocess import InProcess  # and with it the solver, which no native FMU needs
 
-        with Session(InProcess(prepared), log=True) as session:
-            run = _run(session, name, asked)
-        if run.refusal is not None:
-            raise SimulationError(run.refusal.message)
-        rows = run.rows
+        rows = _ran(InProcess(prepared), name, asked)
     else:
         with tempfile.TemporaryDirectory(prefix="lagfmu_") as folder:
             fmu = Path(folder, f"{name}.fmu")
             fmu.write_bytes(native.build(as_built(prepared, target), {}, sources=False))
-            rows = _of_fmu(fmu, name, read_description(fmu), asked)
+            rows = _ran(fmu, name, asked)
     units = {v.name: v.unit.name for v in prepared.table.variables if v.unit is not None}
     return Result(rows, units, name, target)
 
 
-def _of_fmu(path: Path, called: str, description: Any, asked: _Asked) -> Trajectory:
+def _ran(target: Path | InProcess, called: str, asked: _Asked) -> Trajectory:
+    """The rows of a run.  Raises SimulationError where it ends early."""
     try:
-        if obstacle(path, description):
-            run = _by_fmpy(path, called, description, asked)
-        else:
-            with Session(path, log=True) as session:
-                run = _run(session, called, asked)
+        with Session(target, log=True) as session:
+            run = _run(session, called, asked)
+            stop = asked.stop_time or session.experiment.stop_time
     except RefusalError as refusal:
         raise SimulationError(f"{called} cannot be simulated: {refusal.message}") from None
     refused = run.refusal
     if refused is None:
         return run.rows
     if refused.status == DISCARD and refused.time is not None:
-        stop = experiment_of(description, asked.stop_time).stop_time
         raise SimulationError(
             f"{called}: the run ends at t = {refused.time!r} s, before {stop!r} s ({refused.message})"
         )
@@ -169,13 +161,16 @@ def _of_fmu(path: Path, called: str, description: Any, asked: _Asked) -> Traject
 
 def _run(session: Session, called: str, asked: _Asked) -> Run:
     """A run of a session; what it tells of its start and of error bars becomes warnings."""
-    inputs, known = asked.inputs, session.experiment
-    given = _checked(called, session.rules, asked, session.inputs)
+    inputs, known, rules = asked.inputs, session.experiment, session.rules
+    check_inputs(inputs, rules, session.inputs)
+    if problems := problems_of(rules, asked.values):
+        raise SettingError(f"{called}: " + "; ".join(problems))
+    given = {n: rules[n].asked(x) for n, x in asked.values.items()}
     times = communication_points(
         asked.stop_time or known.stop_time, asked.step_size or known.step_size
     )
     every = np.union1d(times, jumps(inputs, times))
-    read, fed = [*session.outputs, *asked.besides], columns_at(inputs, every, session.rules)
+    read, fed = [*session.outputs, *asked.besides], columns_at(inputs, every, rules)
     tolerance = asked.tolerance or known.tolerance
     run = session.run(every.tolist(), given, tolerance, read, fed, late=True)
     tell(text for _, text in session.messages if STARTS.search(text))
@@ -183,28 +178,6 @@ def _run(session: Session, called: str, asked: _Asked) -> Run:
         if status == WARNING and text.startswith(BARS):
             warnings.warn(text, ErrorBarWarning, stacklevel=4)
     return replace(run, rows=run.rows[np.isin(run.rows["time"], times)])
-
-
-def _by_fmpy(path: Path, called: str, description: Any, asked: _Asked) -> Run:
-    """A run of an FMU that no session steps."""
-    rules, variables = described_rules(description), description.modelVariables
-    inputs = [v.name for v in variables if v.causality == "input"]
-    given = _checked(called, rules, asked, inputs)
-    experiment = experiment_of(description, asked.stop_time, asked.step_size)
-    points = communication_points(experiment.stop_time, experiment.step_size)
-    read = [*(v.name for v in variables if v.causality == "output"), *asked.besides]
-    stop, step = float(points[-1]), experiment.step_size
-    return by_fmpy(path, description, stop, step, asked.tolerance, given, asked.inputs, read)
-
-
-def _checked(
-    what: str, rules: Mapping[str, Rule], asked: _Asked, inputs: Sequence[str]
-) -> dict[str, Any]:
-    """The values as the FMU gets them; refused is what it would refuse, all problems at once."""
-    check_inputs(asked.inputs, rules, inputs)
-    if problems := problems_of(rules, asked.values):
-        raise SettingError(f"{what}: " + "; ".join(problems))
-    return {n: rules[n].asked(x) for n, x in asked.values.items()}
 
 
 def steps_of(table: Trajectory) -> int:

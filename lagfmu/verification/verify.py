@@ -1,11 +1,11 @@
-"""verify(): an FMU simulated by fmpy and held against the closed forms that it carries."""
+"""verify(): an FMU, simulated and held against the closed forms that it carries."""
 
 from __future__ import annotations
 
 import os
 import time
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,10 @@ from ..errors import SettingError, VerificationError
 from ..fmu.archive import opened
 from ..fmu.closed_forms import LARGEST_RECORD, CarriedForm, unpack_closed_forms
 from ..fmu.read import Trajectory, experiment_of, kind_of, numbers_of, read_description
+from ..fmu.write import as_fmu
+from ..model.closed_form import ClosedForm, Conserved
+from ..model.model import Model
+from ..model.scene import Scene
 from .check import Against, Check, Verification
 from .closed_forms import check_closed_form
 from .reference import Reference
@@ -32,7 +36,7 @@ OF_THE_FILE = 3  # checks that come before the statements on its physics
 
 
 def verify(
-    fmu: str | os.PathLike[str],
+    source: Model | str | os.PathLike[str],
     start_values: Mapping[str, Any] | None = None,
     stop_time: float | None = None,
     step_size: float | None = None,
@@ -40,8 +44,12 @@ def verify(
     inputs: Trajectory | None = None,
     reference: Reference | None = None,
     statements: str | os.PathLike[str] | None = None,
+    *,
+    closed_forms: Sequence[ClosedForm | Conserved] = (),
+    scene: Scene | str | None = None,
 ) -> Verification:
-    """Simulate the FMU through fmpy and evaluate its closed forms on what it returns.
+    """Simulate an FMU and evaluate its closed forms on what it returns; a model (with these `closed_forms`),
+    or a model file, is built first, natively where a compiler is at hand.
 
     Also checks what FMU checkers do not: that every output is finite, and that the start values in
     modelDescription.xml are those that the binary starts with.  Parameters and start values may be
@@ -56,23 +64,25 @@ def verify(
     Raises VerificationError if the file is corrupt or carries no closed forms of lagfmu, and
     SimulationError if it cannot be simulated.
     """
-    path = Path(fmu)
-    description = read_description(path)
-    against: list[Against] = [] if reference is None else [reference]
-    if statements is not None:
-        against += read_statements(Path(statements), description)
-    closed_forms = closed_forms_in(path) if not against or is_ours(path) else []
-    _check_texts(description, start_values or {})
-    problems = validate_fmu(str(path))
-    begun = time.perf_counter()
-    said = set().union(*(form.variables for form in closed_forms))
-    said = said.union(*(one.variables for one in against))
-    read = {v.name for v in description.modelVariables if v.causality in RECORDED}
-    besides = sorted(read & said)
-    if stop_time is None:
-        stop_time = max((t for one in against if (t := one.stop_time)), default=None)
-    result = simulate(path, stop_time, step_size, tolerance, start_values, inputs, besides=besides)
-    seconds = time.perf_counter() - begun
+    with as_fmu(source, scene, closed_forms) as path:
+        description = read_description(path)
+        against: list[Against] = [] if reference is None else [reference]
+        if statements is not None:
+            against += read_statements(Path(statements), description)
+        forms = closed_forms_in(path) if not against or is_ours(path) else []
+        _check_texts(description, start_values or {})
+        problems = validate_fmu(str(path))
+        begun = time.perf_counter()
+        said = set().union(*(form.variables for form in forms))
+        said = said.union(*(one.variables for one in against))
+        read = {v.name for v in description.modelVariables if v.causality in RECORDED}
+        besides = sorted(read & said)
+        if stop_time is None:
+            stop_time = max((t for one in against if (t := one.stop_time)), default=None)
+        result = simulate(
+            path, stop_time, step_size, tolerance, start_values, inputs, besides=besides
+        )
+        seconds = time.perf_counter() - begun
     used = tolerance or experiment_of(description).tolerance
     values = numbers_of(description)
     values |= {k: float(v) for k, v in (start_values or {}).items() if not isinstance(v, str)}
@@ -86,8 +96,7 @@ def verify(
         names.read(k).head == names.SOLVER for k in start_values or ()
     )
     checks += [
-        check_closed_form(closed_form, result, values, used, as_built)
-        for closed_form in closed_forms
+        check_closed_form(closed_form, result, values, used, as_built) for closed_form in forms
     ]
     for one in against:
         checks += one.checks(result, values)
@@ -104,7 +113,7 @@ def verify(
         span,
         seconds,
         steps,
-        len(closed_forms),
+        len(forms),
         tuple(n for n in outputs if n not in said),
     )
 

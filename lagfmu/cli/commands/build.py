@@ -13,35 +13,26 @@ from ...fmu.compiler import HOST, NAMES
 from ...fmu.face import Face
 from ...fmu.target import NATIVE, PYTHON
 from ...verification.exit_codes import FAILS
-from ..options import (
-    NARROWING,
-    OPTIONS,
-    AddOutput,
-    Arguments,
-    ModelPath,
-    Needs,
-    Target,
-    takes,
-)
+from .. import options
 from ..terminal import console, kilobytes, plainly, say, say_wrote
 
 if TYPE_CHECKING:
     from ...interface.variables import VariableTable
 
 
-@takes(*OPTIONS)
+@options.takes(*options.OPTIONS)
 def build(
-    model: ModelPath,
+    model: options.ModelPath,
     out: Annotated[Path, typer.Option("--out", "-o", help="Output folder.")] = Path("dist"),
     scene: Annotated[
         list[str] | None, typer.Option(help="Only these FMUs of the file; repeatable.")
     ] = None,
-    arguments: Arguments = None,
+    arguments: options.Arguments = None,
     check: Annotated[bool, typer.Option(help="Verify each FMU after building it.")] = True,
     reference: Annotated[
         bool, typer.Option("--reference", help="Put reference results inside (FMI-LS-REF).")
     ] = False,
-    target: Target = None,
+    target: options.Target = None,
     platforms: Annotated[
         list[str] | None,
         typer.Option(
@@ -95,8 +86,8 @@ def build(
         ),
     ] = False,
     *,
-    needs: Needs,
-    add_output: AddOutput = None,
+    needs: options.Needs,
+    add_output: options.AddOutput = None,
 ) -> None:
     """Build the FMUs of a model file into OUT/native/NAME.fmu or OUT/python/NAME.fmu, and verify them."""
     from ...api import package
@@ -125,7 +116,7 @@ def build(
             busy: Any = console.status(what) if s.accuracy is None else progress(console, s.name)
             with busy as shown:
                 prepared = prepare(file.model, s)
-                less = any(needs[n] is not None for n in NARROWING)
+                less = any(needs[n] is not None for n in options.NARROWING)
                 if less and needs["name"] is None:
                     _keep_the_full_one(folder / f"{s.name}.fmu", prepared.table)
                 built = package(

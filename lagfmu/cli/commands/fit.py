@@ -7,18 +7,18 @@ from typing import Annotated
 
 import typer
 
-from ..options import JsonFile, Settings, StepSize, assignments, once
+from ..options import JsonFile, Plot, Runnable, SceneName, Settings, StepSize, assignments, once
 from ..terminal import console, plainly, say, say_wrote
 
 
 def fit(
-    target: Annotated[Path, typer.Argument(help="An FMU, or a model file.")],
+    target: Runnable,
     measured: Annotated[
         list[Path],
         typer.Argument(
             metavar="MEASURED.csv...",
             help="Tables with a column time and one for each measured output, input and parameter of the "
-            "experiment; 'force.A.x [kN]' has a unit of its own, empty cells are gaps.",
+            "experiment; 'force.A.x \\[kN]' has a unit of its own, empty cells are gaps.",
         ),
     ],
     free: Annotated[
@@ -47,13 +47,9 @@ def fit(
         float | None, typer.Option(help="Relative tolerance of the runs (default 1e-9).")
     ] = None,
     step_size: StepSize = None,
-    scene: Annotated[
-        str | None, typer.Option(help="Which FMU of a model file (default: its first).")
-    ] = None,
+    scene: SceneName = None,
     json: JsonFile = None,
-    figure: Annotated[
-        Path | None, typer.Option("--plot", help="Write a figure: .svg, .png or .pdf.")
-    ] = None,
+    figure: Plot = None,
 ) -> None:
     """Find the values of parameters and start values that explain what was measured.
 

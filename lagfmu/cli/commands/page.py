@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..options import AddOutput, Arguments, Needs, takes
+from ..options import AddOutput, Arguments, Needs, SceneName, takes
 from ..terminal import console, kilobytes, plainly, say_wrote
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ def page(
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="The file; default dist/page/NAME.html.")
     ] = None,
-    scene: Annotated[str | None, typer.Option(help="Which FMU of a model file.")] = None,
+    scene: SceneName = None,
     arguments: Arguments = None,
     *,
     needs: Needs,

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from ..options import InputFile, Settings, StepSize, StopTime, Tolerance, assignments
+from .. import options
 from ..terminal import console, kilobytes, plainly, say_wrote
 
 
@@ -21,20 +21,14 @@ def report(
     study: Annotated[
         Path | None, typer.Option(help="The table of a sweep of this FMU, to stand in the report.")
     ] = None,
-    set_: Settings = None,
-    stop_time: StopTime = None,
-    step_size: StepSize = None,
-    tolerance: Tolerance = None,
-    inputs: InputFile = None,
-    reference: Annotated[
-        Path | None, typer.Option(help="CSV of reference results to compare with.")
-    ] = None,
-    statements: Annotated[
-        Path | None, typer.Option(help="TOML of statements that must hold.")
-    ] = None,
-    scene: Annotated[
-        str | None, typer.Option(help="Which FMU of a model file (default: its first).")
-    ] = None,
+    set_: options.Settings = None,
+    stop_time: options.StopTime = None,
+    step_size: options.StepSize = None,
+    tolerance: options.Tolerance = None,
+    inputs: options.InputFile = None,
+    reference: options.ReferenceFile = None,
+    statements: options.StatementsFile = None,
+    scene: options.SceneName = None,
 ) -> None:
     """Write what an FMU does as one file: the mechanism, equations, curves with events, forces with their
     extremes, verification, accuracy, versions."""
@@ -52,7 +46,7 @@ def report(
             out,
             study=study,
             scene=scene,
-            start_values=assignments(set_, lambda: known),
+            start_values=options.assignments(set_, lambda: known),
             stop_time=stop_time,
             step_size=step_size,
             tolerance=tolerance,

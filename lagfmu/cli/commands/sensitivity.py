@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from ...errors import UsageError
-from ..options import InputFile, JsonFile, Settings, StepSize, StopTime, assignments, once
+from .. import options
 from ..terminal import console, plainly, say, say_wrote
 
 
 def sensitivity(
-    target: Annotated[Path, typer.Argument(help="An FMU, or a model file.")],
+    target: options.Runnable,
     of: Annotated[
         list[str],
         typer.Option(
@@ -40,23 +39,19 @@ def sensitivity(
         int, typer.Option(help="With --over: of Sobol's plan, or Morris's trajectories.")
     ] = 256,
     seed: Annotated[int, typer.Option(help="With --over: of the samples.")] = 0,
-    set_: Settings = None,
-    stop_time: StopTime = None,
-    step_size: StepSize = None,
+    set_: options.Settings = None,
+    stop_time: options.StopTime = None,
+    step_size: options.StepSize = None,
     tolerance: Annotated[
         float | None, typer.Option(help="Relative tolerance of the runs (default 1e-11).")
     ] = None,
-    inputs: InputFile = None,
-    scene: Annotated[
-        str | None, typer.Option(help="Which FMU of a model file (default: its first).")
-    ] = None,
+    inputs: options.InputFile = None,
+    scene: options.SceneName = None,
     on: Annotated[
         str | None, typer.Option(metavar="ADDRESS", help="With --over: a Dask scheduler.")
     ] = None,
-    json: JsonFile = None,
-    figure: Annotated[
-        Path | None, typer.Option("--plot", help="Write a figure: .svg, .png or .pdf.")
-    ] = None,
+    json: options.JsonFile = None,
+    figure: options.Plot = None,
 ) -> None:
     """How outputs change with parameters: derivatives at the given values, or indices over ranges."""
     from ...fmu.read import read_description, units_of
@@ -72,7 +67,7 @@ def sensitivity(
     by = [n for text in to or () for n in listed(text)] or ALL
     with plainly(), made_for(target, outputs, by, scene) as fmu:
         units = units_of(read_description(fmu).modelVariables)
-        given = assignments(set_, lambda: units)
+        given = options.assignments(set_, lambda: units)
         signals = None if inputs is None else read_table(inputs)
         run: dict[str, Any] = {"stop_time": stop_time, "step_size": step_size, "inputs": signals}
         found: Any
@@ -81,7 +76,7 @@ def sensitivity(
                 raise UsageError(
                     "--to and --set are for derivatives; --over says itself what varies"
                 )
-            ranges = once(_range(text) for text in over)
+            ranges = options.once(_range(text) for text in over)
             found = over_ranges(
                 fmu,
                 list(outputs),

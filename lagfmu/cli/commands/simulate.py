@@ -10,18 +10,7 @@ import typer
 from rich.markup import escape
 
 from ...errors import SettingError
-from ..options import (
-    AddOutput,
-    Arguments,
-    ErrorBars,
-    InputFile,
-    Settings,
-    StepSize,
-    StopTime,
-    Target,
-    Tolerance,
-    assignments,
-)
+from .. import options
 from ..terminal import console, plainly, say_wrote
 
 if TYPE_CHECKING:
@@ -29,18 +18,14 @@ if TYPE_CHECKING:
 
 
 def simulate(
-    source: Annotated[
-        Path, typer.Argument(metavar="MODEL.py|FILE.fmu", help="A model file, or an FMU.")
-    ],
-    set_: Settings = None,
-    stop_time: StopTime = None,
-    step_size: StepSize = None,
-    tolerance: Tolerance = None,
-    scene: Annotated[str | None, typer.Option(help="Which FMU of a model file.")] = None,
-    arguments: Arguments = None,
-    plot_: Annotated[
-        Path | None, typer.Option("--plot", help="Write a figure: .svg, .png or .pdf.")
-    ] = None,
+    source: options.Runnable,
+    set_: options.Settings = None,
+    stop_time: options.StopTime = None,
+    step_size: options.StepSize = None,
+    tolerance: options.Tolerance = None,
+    scene: options.SceneName = None,
+    arguments: options.Arguments = None,
+    plot_: options.Plot = None,
     variable: Annotated[
         list[str] | None,
         typer.Option("--variable", "-v", help="What to print and plot; repeatable."),
@@ -50,10 +35,10 @@ def simulate(
         Path | None,
         typer.Option(help="Write a film of the model's picture: .gif, .webp, .mp4 or .html."),
     ] = None,
-    inputs: InputFile = None,
-    error_bars: ErrorBars = None,
-    target: Target = None,
-    add_output: AddOutput = None,
+    inputs: options.InputFile = None,
+    error_bars: options.ErrorBars = None,
+    target: options.Target = None,
+    add_output: options.AddOutput = None,
 ) -> None:
     """Simulate an FMU or a model; print the last values, plot or save the rest.
 
@@ -81,7 +66,7 @@ def simulate(
             name, variables = description.modelName, description.modelVariables
         known = {v.name: v.causality for v in variables if v.causality != "parameter"}
         besides = _besides(variable or (), known)
-        given = assignments(set_, lambda: units_of(variables))
+        given = options.assignments(set_, lambda: units_of(variables))
         with console.status(f"simulating {name}"):
             signals = None if inputs is None else read_table(inputs)
             result = simulated(

@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from ..options import JsonFile, JunitFile, Target
+from ..options import JsonFile, JunitFile, Runnables, SceneNames, Target
 from ..terminal import console, plainly
 
 
 def stress(
-    targets: Annotated[
-        list[Path], typer.Argument(metavar="MODEL.py|FILE.fmu...", help="Model files and FMUs.")
-    ],
-    out: Annotated[Path, typer.Option("--out", "-o", help="Output folder.")] = Path("dist/stress"),
+    targets: Runnables,
     target: Target = None,
-    scene: Annotated[
-        list[str] | None, typer.Option(help="Only these FMUs of model files; repeatable.")
-    ] = None,
+    scene: SceneNames = None,
     quick: Annotated[bool, typer.Option("--quick", help="Half of the probes.")] = False,
     limit: Annotated[float, typer.Option(help="Time limit of one probe in s.")] = 60.0,
     json: JsonFile = None,
@@ -30,5 +24,5 @@ def stress(
     from ..stress import stress as probed
 
     with plainly():
-        done = probed(targets, out, console, target, scene or (), quick, limit=limit)
+        done = probed(targets, console, target, scene or (), quick, limit=limit)
         finish("stress", done, json, junit)

@@ -11,12 +11,12 @@ from typing import Annotated
 import typer
 
 from ...errors import SettingError
-from ..options import InputFile, StepSize, StopTime, Tolerance, once
+from ..options import InputFile, Plot, Runnable, SceneName, StepSize, StopTime, Tolerance, once
 from ..terminal import plainly, say_wrote
 
 
 def sweep(
-    target: Annotated[Path, typer.Argument(help="An FMU, or a model file.")],
+    target: Runnable,
     vary: Annotated[
         list[str] | None,
         typer.Option(
@@ -54,9 +54,7 @@ def sweep(
     step_size: StepSize = None,
     tolerance: Tolerance = None,
     inputs: InputFile = None,
-    scene: Annotated[
-        str | None, typer.Option(help="Which FMU of a model file (default: its first).")
-    ] = None,
+    scene: SceneName = None,
     out: Annotated[
         Path | None,
         typer.Option("--out", "-o", help="runs.parquet or .csv; .nc or .zarr with trajectories."),
@@ -77,9 +75,7 @@ def sweep(
     resume: Annotated[
         bool, typer.Option("--resume", help="Continue an interrupted sweep.")
     ] = False,
-    figure: Annotated[
-        Path | None, typer.Option("--plot", help="Write a figure: .svg, .png or .pdf.")
-    ] = None,
+    figure: Plot = None,
 ) -> None:
     """Run an FMU many times: parameters and start values crossed, sampled, or from a file."""
     from ...study.sweep.design import axis, distribution, from_file

@@ -7,21 +7,17 @@ from typing import Annotated
 
 import typer
 
-from ..options import JsonFile, JunitFile, Target
+from ..options import JsonFile, JunitFile, Runnables, SceneNames, Target
 from ..terminal import console, plainly
 
 
 def tradeoff(
-    targets: Annotated[
-        list[Path], typer.Argument(metavar="MODEL.py|FILE.fmu...", help="Model files and FMUs.")
-    ],
+    targets: Runnables,
     out: Annotated[Path, typer.Option("--out", "-o", help="Output folder.")] = Path(
         "dist/tradeoff"
     ),
     target: Target = None,
-    scene: Annotated[
-        list[str] | None, typer.Option(help="Only these FMUs of model files; repeatable.")
-    ] = None,
+    scene: SceneNames = None,
     step_size: Annotated[
         float | None, typer.Option(help="Communication step in s (default: the FMU's own).")
     ] = None,

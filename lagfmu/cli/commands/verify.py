@@ -9,29 +9,18 @@ from typing import Annotated
 import typer
 
 from ...errors import LagfmuError, SimulationError, UsageError
-from ..options import (
-    InputFile,
-    JsonFile,
-    JunitFile,
-    Settings,
-    StepSize,
-    StopTime,
-    Tolerance,
-    assignments,
-)
+from .. import options
 from ..terminal import plainly, say, say_wrote
 
 
 def verify(
     fmus: Annotated[list[Path], typer.Argument(metavar="FILE.fmu...", help="FMUs.")],
-    set_: Settings = None,
-    stop_time: StopTime = None,
-    step_size: StepSize = None,
-    tolerance: Tolerance = None,
-    inputs: InputFile = None,
-    reference: Annotated[
-        Path | None, typer.Option(help="CSV of reference results to compare with.")
-    ] = None,
+    set_: options.Settings = None,
+    stop_time: options.StopTime = None,
+    step_size: options.StepSize = None,
+    tolerance: options.Tolerance = None,
+    inputs: options.InputFile = None,
+    reference: options.ReferenceFile = None,
     rtol: Annotated[
         list[str] | None,
         typer.Option(
@@ -42,15 +31,13 @@ def verify(
     atol: Annotated[
         float, typer.Option(help="Allowed absolute error, in the column's unit.")
     ] = 0.0,
-    statements: Annotated[
-        Path | None, typer.Option(help="TOML of statements that must hold, for any FMU.")
-    ] = None,
+    statements: options.StatementsFile = None,
     html: Annotated[
         Path | None,
         typer.Option(help="Write a page with what was found, and pictures of what fails."),
     ] = None,
-    json: JsonFile = None,
-    junit: JunitFile = None,
+    json: options.JsonFile = None,
+    junit: options.JunitFile = None,
 ) -> None:
     """Simulate FMUs through fmpy and check them against closed forms, statements and a reference.
 
@@ -76,7 +63,7 @@ def verify(
             table = None if known is None else Reference(known, common, atol, own)
         except SimulationError as error:
             raise UsageError(str(error)) from None
-        values = assignments(set_, lambda: _units(fmus))
+        values = options.assignments(set_, lambda: _units(fmus))
         done = []
         for fmu in fmus:  # one that cannot be run does not keep the others from it
             try:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import cycle
 from pathlib import Path
 from typing import Any
 
@@ -38,7 +39,7 @@ def draw(
             above, below = axes[0, k], axes[1, k]
             unit = for_reading(units.get(output))
             above.set_title(f"{output} [{unit}]" if unit else output, loc="left", fontsize=10)
-            for colour, (name, columns) in zip(_endless(), tables.items(), strict=False):
+            for colour, (name, columns) in zip(cycle(COLOURS), tables.items(), strict=False):
                 if output not in columns:
                     continue
                 time, measured, fitted = columns[output]
@@ -55,8 +56,3 @@ def draw(
             above.legend(frameon=False, fontsize=9)
         figure.suptitle(title, fontsize=11)
         return figure if out is None else save(figure, Path(out))
-
-
-def _endless() -> Any:
-    while True:
-        yield from COLOURS

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from scipy import optimize
 
 from ...errors import SettingError, SimulationError
-from ...fmu.read import described_rules, experiment_of, obstacle, read_description
 from ...fmu.session import RefusalError, Session
 from ...fmu.write import as_fmu
 from ...model.model import Model
@@ -72,24 +71,21 @@ def fit(
         raise SettingError(problem)
     sought = free if isinstance(free, Mapping) else dict.fromkeys(free)
     wanted = measure if isinstance(measure, Mapping) else dict.fromkeys(measure)
-    with as_fmu(source, scene, sensitivities=derivatives_of(sought, wanted)) as path:
-        description = read_description(path)
-        if text := obstacle(path, description):
-            raise SimulationError(f"{str(path)!r} {text}")
-        rules, given = described_rules(description), dict(start_values or {})
+    told = derivatives_of(sought, wanted)
+    with as_fmu(source, scene, sensitivities=told) as path, Session(path) as session:
+        given = dict(start_values or {})
         asked = problem_of(
-            description.modelVariables,
-            rules,
+            session.description.modelVariables,
+            session.rules,
             experiments_of(measured),
             sought,
             wanted,
             given,
             offset,
         )
-        with Session(path) as session:
-            step = step_size or experiment_of(description).step_size
-            residuals = Residuals(asked, session, tolerance, step, given)
-            return _solve(description.modelName, asked, residuals, loss)
+        step = step_size or session.experiment.step_size
+        residuals = Residuals(asked, session, tolerance, step, given)
+        return _solve(session.description.modelName, asked, residuals, loss)
 
 
 def _solve(name: str, problem: Problem, residuals: Residuals, loss: str) -> Fit:

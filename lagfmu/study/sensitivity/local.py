@@ -146,21 +146,17 @@ def sensitivity(
     """
     if problem := tolerance_problem(tolerance):
         raise SettingError(problem)
-    with made_for(source, of, to, scene) as path:
-        description = read_description(path)
-        if text := obstacle(path, description):
-            raise SimulationError(f"{str(path)!r} {text}")
-        rules, given = described_rules(description), dict(start_values or {})
+    with made_for(source, of, to, scene) as path, Session(path) as session:
+        description, rules, given = session.description, session.rules, dict(start_values or {})
         variables = {v.name: v for v in description.modelVariables}
         asked = settable(variables, rules) if to in (ALL, [ALL], (ALL,)) else list(to)
         _check(variables, rules, of, asked, given)
-        check_inputs(inputs, rules, [n for n, v in variables.items() if v.causality == "input"])
+        check_inputs(inputs, rules, session.inputs)
         experiment = experiment_of(description, stop_time, step_size)
         points = communication_points(experiment.stop_time, experiment.step_size)
-        with Session(path) as session:
-            runs = _Runs(session, np.union1d(points, jumps(inputs, points)), tolerance, inputs, of)
-            start = {p: float(given.get(p, rules[p].start or 0.0)) for p in asked}
-            return _found(description, runs, of, start, given, rules)
+        runs = _Runs(session, np.union1d(points, jumps(inputs, points)), tolerance, inputs, of)
+        start = {p: float(given.get(p, rules[p].start or 0.0)) for p in asked}
+        return _found(description, runs, of, start, given, rules)
 
 
 @contextlib.contextmanager

@@ -8,6 +8,7 @@ scene's method and formulation stay.
 from __future__ import annotations
 
 import tempfile
+from bisect import bisect_left
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -88,7 +89,7 @@ def _chosen(session: Session, scene: Scene, goal: Goal, say: Tick) -> Choice:
             tried[k] = attempt(session, dials[k], reference, names)
         return tried[k].error <= goal.on_the_scene
 
-    first = bisected(len(dials), holds)
+    first = bisect_left(range(len(dials)), True, key=holds)
     others = cases(session) if first < len(dials) else []
     failed: list[tuple[Trial, float]] = []
     for k in range(first, len(dials)):
@@ -109,18 +110,6 @@ def _chosen(session: Session, scene: Scene, goal: Goal, say: Tick) -> Choice:
             )
         failed.append((tried[k], worst))
     raise BuildError(_nothing(scene, goal, list(tried.values()), failed))
-
-
-def bisected(count: int, holds: Callable[[int], bool]) -> int:
-    """The first of 0 ... count - 1 that holds, given that all that follow it do; `count` if none does."""
-    low, high = 0, count
-    while low < high:
-        middle = (low + high) // 2
-        if holds(middle):
-            high = middle
-        else:
-            low = middle + 1
-    return low
 
 
 def attempt(

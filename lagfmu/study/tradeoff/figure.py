@@ -6,7 +6,6 @@ hatched part lies below the reference's own error.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -21,11 +20,8 @@ MARKERS = {"dop853": "o", "radau5": "^", "rk4": "D", "rattle": "v"}
 WORTH = 0.1  # part of the error of the last named point at which the next one is named
 
 
-def draw(found: Tradeoff, outs: Sequence[str | os.PathLike[str]]) -> None:
-    """Write the figure to each of `outs` (the ending says the format).
-
-    Raises BuildError if a file cannot be written.
-    """
+def draw(found: Tradeoff, out: Path) -> Path:
+    """Write the figure (the ending says the format).  Raises BuildError if it cannot be."""
     import matplotlib as mpl
     from matplotlib.figure import Figure
 
@@ -48,8 +44,7 @@ def draw(found: Tradeoff, outs: Sequence[str | os.PathLike[str]]) -> None:
         step = found.points[0].setting.communication
         axis.set_title(f"{found.name} ({found.target} FMU), every {step:.3g} s", fontsize=10.5)
         figure.legend(loc="outside right upper", frameon=False, fontsize=9)
-        for out in outs:
-            save(figure, Path(out))
+        return save(figure, out)
 
 
 def _line(axis: Any, found: Tradeoff, points: Sequence[Point], factor: float) -> None:

@@ -35,13 +35,14 @@ SHORTEST, MOST = 1e-3, 20  # a timed piece of work [s], and how many runs it may
 
 @dataclass(frozen=True)
 class Plan:
-    """What to measure: the communication step [s], tolerances, methods; and how long that may take.
+    """What to measure: the communication step [s] (0: the FMU's own), tolerances, methods; and how long that
+    may take.
 
     A fixed step is halved `halvings` times.  A run longer than `limit` [s] ends its method's refinement;
     after `budget` [s] no setting is timed again that was timed `FEWEST` times.
     """
 
-    communication: float
+    communication: float = 0.0
     tolerances: tuple[float, ...] = COARSE
     methods: tuple[str, ...] = INTEGRATORS
     halvings: int = HALVINGS
@@ -111,7 +112,9 @@ def measure(fmu: Path, plan: Plan | None = None, tick: Tick | None = None) -> Tr
                 f"{str(fmu)!r} has no parameter 'solver.method': it was built for a scene with one "
                 "method, and there is none to compare with (give the scene more of them in `methods`)"
             )
-        plan = plan or Plan(session.experiment.step_size)
+        plan = plan or Plan()
+        if not plan.communication:
+            plan = replace(plan, communication=session.experiment.step_size)
         say("reference", 0, 1)
         reference = refer(session, communication=plan.communication)
         points, notes = _errors(session, reference, closed_forms_in(fmu), plan, say)
