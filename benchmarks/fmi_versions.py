@@ -3,7 +3,7 @@
     python benchmarks/fmi_versions.py [MODEL ...]
 
 A row a model of models/: FMI 3.0 over FMI 2.0 in bytes of the archive, in bytes of the binary, and in
-processor time of runs in one call of the library (lagfmu_runs), each the least of 21 in turns.
+processor time of runs in one call of the library (lagfmu_batch), each the least of 21 in turns.
 """
 
 from __future__ import annotations

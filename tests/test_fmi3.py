@@ -101,7 +101,7 @@ def test_a_refusal_has_the_reason_that_it_has_in_fmi_2(native_fmu: Fmu, fmi3_fmu
 
 
 def test_many_runs_in_one_call_are_those_of_fmi_2(native_fmu: Fmu, fmi3_fmu: Fmu) -> None:
-    """lagfmu_runs stands beside the standard's functions in both."""
+    """lagfmu_batch stands beside the standard's functions in both."""
     plan = Plan(
         vary=("theta",), keep=(("departure.surface.time", 0),), times=np.linspace(0.0, 2.0, 21)
     )

@@ -48,7 +48,7 @@ from lagfmu.testing import (
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
 
 HERE = Path(__file__).parent
-EXPORTS = {f"fmi2{name}" for name in FUNCTIONS} | {"lagfmu_runs"}  # the sweep's inner loop
+EXPORTS = {f"fmi2{name}" for name in FUNCTIONS} | {"lagfmu_batch"}  # the sweep's inner loop
 LONG = 600  # seconds: the first build for Windows compiles its C library
 
 
@@ -237,7 +237,7 @@ def test_no_path_of_the_building_machine_is_inside(built_for, folder):
             assert not [t for t in traces if t.encode() in data], name
             if name.startswith("binaries/"):
                 assert b".pdb" not in data
-                assert b"lagfmu_" not in data.replace(b"lagfmu_runs", b"")
+                assert b"lagfmu_" not in data.replace(b"lagfmu_batch", b"")
 
 
 BUILD = """

@@ -61,20 +61,14 @@ def test_a_force_that_jumps_between_points_acts_from_there(pushed, target):
     assert np.abs(run["x"] - exact).max() < 1e-12
 
 
-def test_an_fmu_of_model_exchange_alone_is_simulated(path, tmp_path):
-    """fmpy's integrator moves its states: lambda = m g (3 cos theta - 2 cos theta0) holds all the same."""
+def test_an_fmu_of_model_exchange_alone_is_refused(path, tmp_path):
+    """A session takes communication steps: an FMU that has none is told so."""
     alone = tmp_path / "Alone.fmu"
     with zipfile.ZipFile(path) as old, zipfile.ZipFile(alone, "w") as new:
         for name in old.namelist():
-            content = old.read(name)
-            if name == "modelDescription.xml":
-                begin, end = content.index(b"<CoSimulation"), content.index(b"</CoSimulation>")
-                content = content[:begin] + content[end + len(b"</CoSimulation>") :]
-            new.writestr(name, content)
-    run = lagfmu.simulate(alone, 0.5, 0.05, 1e-9, {"theta": 0.3, "m": 2.0})
-    weight = 2.0 * 9.81 * (3 * np.cos(run["theta"]) - 2 * np.cos(0.3))
-    assert len(run) == 11
-    assert np.abs(run["lambda.surface"] - weight).max() < 1e-5
+            new.writestr(name, old.read(name).replace(b"CoSimulation", b"Other"))
+    with pytest.raises(lagfmu.LagfmuError, match="has no co-simulation"):
+        lagfmu.simulate(alone, 0.5)
 
 
 def test_a_name_that_the_fmu_does_not_have_is_a_refusal(path):

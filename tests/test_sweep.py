@@ -101,10 +101,9 @@ def test_a_run_in_a_sweep_is_the_run_alone(hemisphere):
 
 
 def test_the_loop_in_c_and_the_one_in_python_give_the_same_bits(unpacked):
-    """An FMU of another tool, which has no lagfmu_runs, is run by the same steps."""
+    """An FMU of another tool, which has no lagfmu_batch, is run by the same steps."""
     keep = (("lambda.surface", MAX), ("lambda.surface", MEAN), ("theta", TIME_OF_MAX), ("r", LAST))
-    events = (("departure.surface.count", "departure.surface.time"),)
-    plan = Plan(("theta",), keep, np.linspace(0, 1.5, 31), 1e-9, events=events, whole=True)
+    plan = Plan(("theta",), keep, np.linspace(0, 1.5, 31), 1e-9, whole=True)
     session = Session(unpacked)
     rows = np.array([[0.1], [0.9], [-5e300], [0.3]])
     fast = run_batch(session, plan, rows)
@@ -120,20 +119,6 @@ def test_the_loop_in_c_and_the_one_in_python_give_the_same_bits(unpacked):
     assert fast.status[2] > 1
     assert fast.reasons.keys() == slow.reasons.keys() == {2}
     assert "theta" in fast.reasons[2]
-
-
-def test_the_largest_value_is_looked_for_at_departures_too(unpacked):
-    """theta grows until the particle leaves, and on: at the departure itself it is between two communication
-    points, and what is kept there changes nothing of the run that goes on."""
-    events = (("departure.surface.count", "departure.surface.time"),)
-    wide = Plan(("theta",), (("contact.surface", MAX), ("lambda.surface", LAST), ("der(r)", LAST)),
-                np.array([0.0, 2.0]), 1e-9, events=events)  # fmt: skip
-    session = Session(unpacked)
-    rows = np.array([[0.3]])
-    seen = run_batch(session, wide, rows)
-    blind = run_batch(session, replace(wide, events=()), rows)
-    session.close()
-    assert (seen.result == blind.result).all()
 
 
 def test_a_worker_needs_no_model():

@@ -1,4 +1,4 @@
-"""Many runs of one FMU in one call: through `lagfmu_runs` (runtime/fmi/batch.c) where the library has it,
+"""Many runs of one FMU in one call: through `lagfmu_batch` (runtime/fmi/batch.c) where the library has it,
 else by the loop of the session: slower, with the same numbers."""
 
 from __future__ import annotations
@@ -22,8 +22,7 @@ class Plan:
 
     `vary` are set before initialization, to another row of values in each run; `drive` are inputs, set at
     the communication points to the rows of `drives` (points, inputs).  `keep` are (variable, LAST ...
-    TIME_OF_MAX); `events` are (count, time) of departures.  With `whole`, the values at all points are
-    returned too.
+    TIME_OF_MAX).  With `whole`, the values at all points are returned too.
     """
 
     vary: tuple[str, ...]
@@ -32,7 +31,6 @@ class Plan:
     tolerance: float = 0.0
     drive: tuple[str, ...] = ()
     drives: NDArray[np.float64] | None = None
-    events: tuple[tuple[str, str], ...] = ()
     whole: bool = False
 
 
@@ -74,11 +72,11 @@ class _Batch(ctypes.Structure):
     """Batch of batch.h."""
 
     _fields_ = [
-        *((n, ctypes.c_size_t) for n in ("runs", "varied", "driven", "points", "kept", "events")),
+        *((n, ctypes.c_size_t) for n in ("runs", "varied", "driven", "points", "kept")),
         *((n, ctypes.c_void_p) for n in ("vary", "values", "drive", "drives")),
         ("times", ctypes.c_void_p),
         ("tolerance", ctypes.c_double),
-        *((n, ctypes.c_void_p) for n in ("keep", "what", "count", "when")),
+        *((n, ctypes.c_void_p) for n in ("keep", "what")),
         ("whole", ctypes.c_int),
         *((n, ctypes.c_void_p) for n in ("result", "trajectory", "status", "reached", "scratch")),
         ("current", ctypes.c_size_t),
@@ -96,8 +94,6 @@ def _in_library(session: Session, plan: Plan, values: NDArray[np.float64], found
         "times": np.ascontiguousarray(plan.times, dtype=np.float64),
         "keep": _references(session, names),
         "what": np.array([w for _, w in plan.keep], dtype=np.intc),
-        "count": _references(session, [c for c, _ in plan.events]),
-        "when": _references(session, [t for _, t in plan.events]),
         "result": found.result,
         "trajectory": found.trajectory,
         "status": found.status,
@@ -110,7 +106,6 @@ def _in_library(session: Session, plan: Plan, values: NDArray[np.float64], found
         driven=len(plan.drive),
         points=len(plan.times),
         kept=len(names),
-        events=len(plan.events),
         tolerance=plan.tolerance,
         whole=int(plan.whole),
         current=0,
@@ -148,7 +143,7 @@ def in_session(session: Session, plan: Plan, values: NDArray[np.float64], found:
     tolerance = plan.tolerance or None
     for r, row in enumerate(values):
         given = dict(zip(plan.vary, row.tolist(), strict=True))
-        run = session.run(plan.times.tolist(), given, tolerance, names, inputs, plan.events)
+        run = session.run(plan.times.tolist(), given, tolerance, names, inputs)
         if len(run.rows):
             found.reached[r] = run.rows["time"][-1]
         if found.trajectory is not None:
@@ -166,10 +161,6 @@ def _kept(run: Run, name: str, what: int) -> float:
     if what == MEAN:
         parts = (points[1:] + points[:-1]) / 2 * np.diff(times) / (times[-1] - times[0])
         return float(sum(parts.tolist()))
-    every = np.concatenate([points, run.between[name].astype(float)])
-    when = np.concatenate([times, run.between["time"]])
-    order = np.argsort(when, kind="stable")
-    every, when = every[order], when[order]
     if what in (MAX, MIN):
-        return float(every.max() if what == MAX else every.min())
-    return float(when[every.argmax()] if what == TIME_OF_MAX else every[-1])
+        return float(points.max() if what == MAX else points.min())
+    return float(times[points.argmax()] if what == TIME_OF_MAX else points[-1])

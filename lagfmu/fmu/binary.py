@@ -21,7 +21,7 @@ from fmpy.logging import addLoggerProxy
 
 from .binary3 import Slave3
 
-BATCH = "lagfmu_runs"  # many runs in one call (runtime/fmi/batch.h)
+BATCH = "lagfmu_batch"  # many runs in one call (runtime/fmi/batch.h)
 Hear = Callable[[int, str], None]  # the status of a message, and its text
 
 _here = threading.local()  # fmpy's proxy of the logger knows one logger a process

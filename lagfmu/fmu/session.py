@@ -39,7 +39,6 @@ WARNING, DISCARD, ERROR = 1, 2, 3
 KINDS = {"Real": "Real", "Integer": "Integer", "Enumeration": "Integer", "Boolean": "Boolean"}
 COLUMNS: dict[str, Any] = {"Real": np.float64, "Integer": np.int32, "Boolean": np.bool_}
 Columns = Mapping[str, Sequence[float]]  # of inputs by name, a value a communication point
-Events = Sequence[tuple[str, str]]  # of each what counts it, and when it was last [s]
 
 
 class RefusalError(Exception):
@@ -53,13 +52,10 @@ class RefusalError(Exception):
 
 @dataclass(frozen=True)
 class Run:
-    """Time and values, a row a communication point that was reached, and what ended the run early.
-
-    `between`: rows at events between the points; `seconds`: wall time of stepping and reading.
-    """
+    """Time and values, a row a communication point that was reached, and what ended the run early; `seconds`:
+    wall time of stepping and reading."""
 
     rows: Trajectory
-    between: Trajectory
     refusal: RefusalError | None
     seconds: float
 
@@ -251,18 +247,15 @@ class Session:
         tolerance: float | None = None,
         read: Sequence[str] | None = None,
         inputs: Columns | None = None,
-        events: Events = (),
         late: bool = False,
     ) -> Run:
         """A run over the communication points `times` [s], as far as the FMU goes.
 
         `values` are set before it starts; `read` are the columns of its rows (all outputs).  `inputs` are set
-        at each point before it is read, with `late` (as fmpy does) when it has been read.  Of `events` that
-        fall between two points the latest is read too, on a way aside: the run goes on as it would have.
+        at each point before it is read, with `late` (as fmpy does) when it has been read.
         """
         points, names = [float(t) for t in times], self.outputs if read is None else list(read)
         rows: list[tuple[Any, ...]] = []
-        between: list[tuple[Any, ...]] = []
         refusal, begun = None, clock.perf_counter()
         try:
             first = {n: float(column[0]) for n, column in (inputs or {}).items()}
@@ -271,19 +264,11 @@ class Session:
                 look, feed = self._reader(names), self._feeder(inputs or {})
                 step, begun = self.instance.doStep, clock.perf_counter()
                 rows.append((points[0], *look()))
-                count = self._counted(events)[0] if events else 0
                 for k, (t, later) in enumerate(itertools.pairwise(points)):
                     if late:
                         feed(k)
-                    before = self.instance.getFMUstate() if events else None
                     step(t, later - t)
                     self.time = later
-                    if events:
-                        now, latest = self._counted(events)
-                        if now > count and t < latest < later:
-                            between.append((latest, *self._aside(before, t, latest, look)))
-                        self.instance.freeFMUstate(before)
-                        count = now
                     if not late:
                         feed(k + 1)
                     rows.append((later, *look()))
@@ -292,23 +277,7 @@ class Session:
             refusal = error
             self.renew()
         seconds = clock.perf_counter() - begun
-        return Run(self._table(names, rows), self._table(names, between), refusal, seconds)
-
-    def _aside(self, before: Any, t: float, at: float, look: Callable[[], list[Any]]) -> list[Any]:
-        """What is read at an event at the time `at` [s] in the step from t, which has been done."""
-        after = self.instance.getFMUstate()
-        self.instance.setFMUstate(before)
-        self.instance.doStep(t, at - t)
-        seen = look()
-        self.instance.setFMUstate(after)
-        self.instance.freeFMUstate(after)
-        return seen
-
-    def _counted(self, events: Events) -> tuple[int, float]:
-        """Events so far, and the time [s] of the latest."""
-        found = self._reader([n for pair in events for n in pair])()
-        happened = [time for count, time in zip(found[::2], found[1::2], strict=True) if count > 0]
-        return int(sum(found[::2])), max(happened, default=-np.inf)
+        return Run(self._table(names, rows), refusal, seconds)
 
     def _feeder(self, inputs: Columns) -> Callable[[int], None]:
         """Sets inputs to their values at point k."""

@@ -60,17 +60,15 @@ int page_run(int varied, const unsigned *vary, const double *values, double tole
     const size_t width = (size_t)kept;
     double *room = calloc(3 * width + 1, sizeof *room); /* result, scratch */
     int *last = calloc(width + 1, sizeof *last);        /* KEEP_LAST */
-    char *states = instance == NULL ? NULL : calloc(2, instance_record_size(instance));
-    if (room != NULL && last != NULL && states != NULL) {
+    if (instance != NULL && room != NULL && last != NULL) {
         Batch batch = {.runs = 1, .varied = (size_t)varied, .points = (size_t)points, .kept = width,
                        .vary = vary, .values = values, .times = times, .tolerance = tolerance, .keep = keep,
                        .what = last, .whole = 1, .result = room, .trajectory = rows, .status = &status,
                        .reached = &reached, .scratch = room + width};
-        batch_run(instance, &batch, states);
+        batch_run(instance, &batch);
     }
     free(room);
     free(last);
-    free(states);
     return status;
 }
 

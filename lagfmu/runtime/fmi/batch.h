@@ -13,10 +13,10 @@ typedef enum { KEEP_LAST, KEEP_MAX, KEEP_MIN, KEEP_MEAN, KEEP_TIME_OF_MAX } Keep
 typedef enum { RUN_DONE = 0, RUN_STOPPED = 2, RUN_REFUSED = 3 } RunStatus; /* as FMI numbers discard and error */
 
 /* Runs r = 0 .. runs - 1 from times[0] to times[points - 1] [s].  What is kept of a variable is taken over
- * the communication points and the departures between them; the mean is the trapezoidal rule's over the
- * points.  Variables are value references.  All arrays are the caller's. */
+ * the communication points; the mean is the trapezoidal rule's.  Variables are value references.  All arrays
+ * are the caller's. */
 typedef struct {
-    size_t runs, varied, driven, points, kept, events;
+    size_t runs, varied, driven, points, kept;
     const unsigned *vary;   /* (varied) set before initialization, ... */
     const double *values;   /* (runs * varied) ... to these */
     const unsigned *drive;  /* (driven) inputs, ... */
@@ -25,8 +25,6 @@ typedef struct {
     double tolerance;       /* of the experiment; 0: none */
     const unsigned *keep;   /* (kept) what is read, ... */
     const int *what;        /* ... and a Keep */
-    const unsigned *count;  /* (events) what counts departures, ... */
-    const unsigned *when;   /* ... and the time of the latest [s] */
     int whole;              /* 1: `trajectory` is wanted */
     double *result;         /* (runs * kept) */
     double *trajectory;     /* (runs * points * kept) */
@@ -36,8 +34,8 @@ typedef struct {
     size_t current;         /* the run under way, for whoever reads the log */
 } Batch;
 
-/* Tries every run from `current` on; why one ends early is told as its status stands.  `states`: room for two
- * records of the instance (instance_record_size), which is as new at the end. */
-SHARED void batch_run(Instance *x, Batch *batch, char *states);
+/* Tries every run from `current` on; why one ends early is told as its status stands.  The instance is as new at
+ * the end. */
+SHARED void batch_run(Instance *x, Batch *batch);
 
 #endif

@@ -121,19 +121,12 @@ int component_forbids(Component *c, const Call *call) {
 }
 
 int component_runs(Component *c, const Call *call, Batch *batch) {
-    Why text;
     if (component_forbids(c, call)) return CALL_ERROR;
     if (batch == NULL || batch->points < 2) return component_missing(c, call);
-    char *states = c->allocate(2, instance_record_size(&c->instance));
-    if (states == NULL) {
-        (void)fail(&text, "%s: no memory", call->name);
-        return component_refuse(c, text.text);
-    }
     const Halt halt = c->instance.solver.halt;
     c->instance.solver.halt = HALT_NEVER;
-    batch_run(&c->instance, batch, states);
+    batch_run(&c->instance, batch);
     c->instance.solver.halt = halt;
-    c->release(states);
     c->instance.phase = INSTANTIATED;
     return CALL_OK;
 }

@@ -5,8 +5,8 @@
  * reason in the log and leaves the instance as it was, so that the importer may correct it; a communication step
  * that cannot be done returns fmi2Discard, likewise.
  *
- * Memory: one block in fmi2Instantiate, one in fmi2GetFMUstate or fmi2DeSerializeFMUstate, and
- * one for the time of lagfmu_runs (fmi2_steps.c), all by the importer's callbacks. */
+ * Memory: one block in fmi2Instantiate, one in fmi2GetFMUstate or fmi2DeSerializeFMUstate, all by the
+ * importer's callbacks. */
 #include <stdlib.h>
 #include <string.h>
 

@@ -59,7 +59,7 @@ enum {
     CALL(fmi2GetIntegerStatus, 0, FMI2_STEPPED)                               \
     CALL(fmi2GetBooleanStatus, 0, FMI2_STEPPED)                               \
     CALL(fmi2GetStringStatus, 0, FMI2_STEPPED)                                \
-    CALL(lagfmu_runs, 0, ANY_MODE)
+    CALL(lagfmu_batch, 0, ANY_MODE)
 
 #define FMI2_NUMBER(function, exchange, steps) FMI2_OF_##function,
 enum { FMI2_TABLE(FMI2_NUMBER) FMI2_CALL_COUNT };

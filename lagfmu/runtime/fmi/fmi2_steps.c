@@ -83,11 +83,11 @@ fmi2Status fmi2GetStringStatus(fmi2Component component, const fmi2StatusKind s,
 
 /* ------------------------------------------------------------------ beside the standard */
 
-#define lagfmu_runs FMI2_NAME(lagfmu_runs)
+#define lagfmu_batch FMI2_NAME(lagfmu_batch)
 
 /* What became of the runs stands in the batch; the instance is as new. */
-FMI2_EXPORT fmi2Status lagfmu_runs(fmi2Component component, Batch *batch);
+FMI2_EXPORT fmi2Status lagfmu_batch(fmi2Component component, Batch *batch);
 
-fmi2Status lagfmu_runs(fmi2Component component, Batch *batch) {
-    return component_runs(component, FMI2_CALL(lagfmu_runs), batch);
+fmi2Status lagfmu_batch(fmi2Component component, Batch *batch) {
+    return component_runs(component, FMI2_CALL(lagfmu_batch), batch);
 }

@@ -74,7 +74,7 @@ enum {
     CALL(fmi3GetOutputDerivatives, 0, STEPPING | TERMINATED | BETWEEN)                    \
     CALL(fmi3DoStep, 0, STEPPING)                                                         \
     CALL(fmi3ActivateModelPartition, 0, 0)                                                \
-    CALL(lagfmu_runs, 0, FMI3_ANY_S)
+    CALL(lagfmu_batch, 0, FMI3_ANY_S)
 
 /* Only a Float64 can be continuous, and exchanged in Intermediate Update Mode. */
 #define FMI3_TABLE_OF_VALUES(CALL)                                             \

@@ -67,11 +67,11 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
 
 /* ------------------------------------------------------------------ beside the standard */
 
-#define lagfmu_runs FMI3_NAME(lagfmu_runs)
+#define lagfmu_batch FMI3_NAME(lagfmu_batch)
 
 /* What became of the runs stands in the batch; the instance is as new. */
-FMI3_EXPORT fmi3Status lagfmu_runs(fmi3Instance instance, Batch *batch);
+FMI3_EXPORT fmi3Status lagfmu_batch(fmi3Instance instance, Batch *batch);
 
-fmi3Status lagfmu_runs(fmi3Instance instance, Batch *batch) {
-    return component_runs(instance, FMI3_CALL(lagfmu_runs), batch);
+fmi3Status lagfmu_batch(fmi3Instance instance, Batch *batch) {
+    return component_runs(instance, FMI3_CALL(lagfmu_batch), batch);
 }

@@ -16,7 +16,6 @@ from scipy import stats
 from .problem import Problem
 
 Floats = NDArray[np.float64]
-NOISE = 1e-6  # of the largest singular value: what differences of runs do not tell from 0
 LOOSE = 1.0  # relative uncertainty from which on a combination is not determined
 SMALL = 0.05  # part in a combination that is not told
 LEVEL = 0.95

@@ -16,7 +16,7 @@ TRAJECTORY = "trajectory"
 PEAKS = {"max": "peak.max", "min": "peak.min", "time-of-max": "peak.max_time"}
 FOUND = {  # of the reductions that look for something: whether the FMU has found it
     True: "of the continuous motion, found by the FMU itself",
-    False: "of the communication points, and of events between them",
+    False: "of the communication points",
 }
 
 
@@ -28,11 +28,6 @@ class Kept:
     numbers: tuple[tuple[str, str], ...]
     trajectories: tuple[str, ...]
     peaks: tuple[tuple[str, str], ...] = ()
-
-    @property
-    def extremes(self) -> bool:
-        """Whether anything is kept that is looked for at events too."""
-        return any(how in PEAKS and (n, how) not in self.peaks for n, how in self.numbers)
 
     def about(self, column: str) -> str:
         """What a column NAME:HOW has been found in; empty where it is plain."""

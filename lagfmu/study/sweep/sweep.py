@@ -16,7 +16,6 @@ import fmpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ... import names
 from ...errors import SettingError, SimulationError
 from ...fmu.archive import unpack, version
 from ...fmu.batch import Plan
@@ -83,7 +82,7 @@ def sweep(
     structured array, or a dict of sequences).
 
     `keep` lists 'NAME:last', ':max', ':min', ':time-of-max' (of the continuous motion where the FMU has
-    peaks, as one that is built here; else of communication points and events), ':mean' or
+    peaks, as one that is built here; else of communication points), ':mean' or
     ':trajectory'.  If empty: the largest multipliers, counts and times of departures and of slipping.
     `out` is .parquet or .csv (a row for each run), or .nc or .zarr (with trajectories).  Finished parts
     are in OUT.parts; `resume` continues from them.  `on` is a Dask scheduler's address or a
@@ -192,7 +191,6 @@ def _study(
         tolerance=tolerance or 0.0,
         drive=tuple(driven),
         drives=np.column_stack(list(driven.values())) if driven else None,
-        events=_events(variables) if kept.extremes else (),
         whole=bool(kept.trajectories),
     )
     facts = {
@@ -361,16 +359,6 @@ def _check(varied: Design, rules: Mapping[str, Rule], driven: Collection[str]) -
 def _asked(rule: Rule, column: NDArray[np.float64]) -> NDArray[np.float64]:
     """Values that vary as the FMU gets them."""
     return np.array([rule.asked(x) for x in column]) if rule.follows else column
-
-
-def _events(variables: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
-    """(count, time) of what happens between points and is counted: departures, starts of slipping."""
-    pairs = [
-        (names.name(count, c), names.name(time, c))
-        for time, count in names.COUNT_OF.items()
-        for c in names.constraints(variables, count)
-    ]
-    return tuple(p for p in pairs if p[1] in variables)
 
 
 def _save(found: Any, out: Path) -> None:
