@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -26,6 +25,7 @@ from .model.goal import parse
 from .model.model import Model
 from .model.scene import Scene
 from .page.notebook import html
+from .page.table import printed
 from .page.text import show as show_prepared
 from .page.text import show_besides
 from .prepare.prepare import Prepared, prepare
@@ -110,12 +110,7 @@ class Shown:
         return html(self.prepared.form) + f"<pre>{escape(self._printed(show_besides))}</pre>"
 
     def _printed(self, what: Callable[[Prepared, Console, str], None]) -> str:
-        console = Console(
-            file=io.StringIO(), width=100, color_system=None, force_jupyter=False, emoji=False
-        )
-        what(self.prepared, console, self.untried)
-        text: str = console.file.getvalue()  # type: ignore[attr-defined]
-        return text.strip()
+        return printed(lambda console: what(self.prepared, console, self.untried), 100)
 
 
 def show(model: Model | str | os.PathLike[str], scene: Scene | str | None = None) -> Shown:

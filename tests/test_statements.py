@@ -169,7 +169,7 @@ def test_every_mistake_in_a_file_is_named_at_once(held):
     text = str(refused.value)
     for part in (
         "within = -1",
-        "[[bound]] is unknown, expected one of equal, bounds",
+        "[[bound]]: 'bound' is unknown; did you mean 'bounds'",
         "did you mean 'bounds'",
         "[[bounds]] 1: at_least = True",
         "[[bounds]] 2: 'at_least' or 'at_most' is missing",

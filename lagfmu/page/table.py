@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import io
+from collections.abc import Callable, Sequence
+from functools import partial
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console, RenderableType
@@ -31,6 +33,18 @@ def _width(cell: RenderableType) -> int:
     if not isinstance(cell, str):
         return 0
     return max((line.cell_len for line in Text.from_markup(cell, emoji=False).split()), default=0)
+
+
+def printed(what: Callable[[Console], None], width: int) -> str:
+    """What is printed on a console of that width, as plain text."""
+    file = io.StringIO()
+    what(Console(file=file, width=width, color_system=None, force_jupyter=False, emoji=False))
+    return "\n".join(line.rstrip() for line in file.getvalue().strip("\n").splitlines())
+
+
+def as_text(*drawn: Table) -> str:
+    """Tables as plain text, as wide as they are."""
+    return "\n".join(printed(partial(print_whole, drawn=table), 10_000) for table in drawn)
 
 
 def print_whole(console: Console, drawn: Table) -> None:

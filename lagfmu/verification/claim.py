@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from .. import names
 from ..fmu.read import Trajectory
 from ..model.elements import Expr
-from .check import Check, Missed
-from .closed_forms import first_miss
+from .check import Check
+from .closed_forms import measured
 from .evaluate import evaluate
 
 # of the formula of a key, at the points of a statement
@@ -58,15 +58,9 @@ class Claim:
         if self.kind == "event":
             return [self._event(of, rows["time"])]
         actual, nearest = of("of"), self._nearest(of)
-        deviation = np.abs(actual - nearest)
-        scale = float(np.abs(of("scale" if "scale" in self.formulas else "of")).max()) or 1.0
-        error = max(float(deviation.max()) - self.absolute, 0.0) / scale
-        if not np.isfinite(error):
-            return [Check(self.name, np.inf, self.within, len(rows), "not a finite number")]
-        misses = deviation > self.absolute + self.within * scale
-        detail = first_miss(result, np.flatnonzero(chosen)[misses])
-        missed = Missed(rows["time"], actual, nearest) if misses.any() else None
-        return [Check(self.name, error, self.within, len(rows), detail, missed)]
+        scale = of("scale") if "scale" in self.formulas else actual
+        found = (self.name, self.within, result, chosen, actual, nearest, scale, self.absolute)
+        return [measured(*found)]
 
     def _nearest(self, of: Values) -> NDArray[np.float64]:
         """What `of` would have to be at each point, as near as possible to what it is."""

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from .. import names
 from ..fmu.closed_forms import CarriedForm
 from ..fmu.read import Trajectory
+from ..model.elements import Expr
 from .check import Check, Missed
 from .evaluate import evaluate
 
@@ -29,29 +30,39 @@ def check_closed_form(
     result = _with_modes(result)
     chosen = applies(closed_form, result, values)
     allowed = closed_form.allowed(tolerance, as_built)
-    count = int(chosen.sum())
-    if count == 0:
+    if not chosen.any():
         return Check(closed_form.name, 0.0, allowed, 0)
-    rows = result[chosen]
-    actual = evaluate(closed_form.actual, rows, result, values, closed_form.name)
-    if closed_form.expected is None:
-        expected = np.full_like(actual, actual[0])
-    else:
-        expected = evaluate(closed_form.expected, rows, result, values, closed_form.name)
-    if closed_form.scale is None:
-        scale = float(np.abs(expected).max())
-    else:
-        scale = float(
-            np.abs(evaluate(closed_form.scale, rows, result, values, closed_form.name)).max()
-        )
-    error = float(np.abs(actual - expected).max())
+
+    def of(expression: Expr) -> NDArray[np.float64]:
+        return evaluate(expression, result[chosen], result, values, closed_form.name)
+
+    actual = of(closed_form.actual)
+    first = np.full_like(actual, actual[0])
+    expected = first if closed_form.expected is None else of(closed_form.expected)
+    scale = expected if closed_form.scale is None else of(closed_form.scale)
+    return measured(closed_form.name, allowed, result, chosen, actual, expected, scale)
+
+
+def measured(
+    name: str,
+    allowed: float,
+    result: Trajectory,
+    chosen: NDArray[np.bool_],
+    actual: NDArray[np.float64],
+    expected: NDArray[np.float64],
+    scale: NDArray[np.float64],
+    absolute: float = 0.0,
+) -> Check:
+    """What was found at the points that are `chosen` of a run, held against what is expected there: an error
+    may be `absolute` + `allowed` times the largest magnitude of `scale`."""
+    off, size = np.abs(actual - expected), float(np.abs(scale).max()) or 1.0
+    error = max(float(off.max()) - absolute, 0.0) / size
     if not math.isfinite(error):
-        return Check(closed_form.name, math.inf, allowed, count, "not a finite number")
-    misses = np.abs(actual - expected) > allowed * (scale if scale > 0 else 1.0)
+        return Check(name, math.inf, allowed, len(actual), "not a finite number")
+    misses = off > absolute + allowed * size
     detail = first_miss(result, np.flatnonzero(chosen)[misses])
-    missed = Missed(rows["time"], actual, expected) if misses.any() else None
-    error = error / scale if scale > 0 else error
-    return Check(closed_form.name, error, allowed, count, detail, missed)
+    missed = Missed(result["time"][chosen], actual, expected) if misses.any() else None
+    return Check(name, error, allowed, len(actual), detail, missed)
 
 
 def first_miss(result: Trajectory, missed: NDArray[np.int_]) -> str:

@@ -9,7 +9,6 @@ Formulas are read as text that is never run (model/named.py); what comes of a st
 
 from __future__ import annotations
 
-import difflib
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -25,6 +24,7 @@ from ..fmu.read import numbers_of
 from ..model.closed_form import output
 from ..model.elements import Expr
 from ..model.named import read_named
+from ..model.rule import missing
 from .check import Against
 from .claim import Claim
 from .reference import Reference, read_table
@@ -79,7 +79,7 @@ def read_statements(path: Path, description: Any) -> list[Against]:
     found: list[Against] = []
     for kind, entries in said.items():
         if kind not in KINDS:
-            problems.append(f"[[{kind}]] is {_unknown(kind, KINDS)}")
+            problems.append(f"[[{kind}]]: {missing(kind, KINDS, 'is unknown')}")
         elif not isinstance(entries, list) or not all(isinstance(e, dict) for e in entries):
             problems.append(f"{kind!r}: expected tables [[{kind}]]")
         else:
@@ -129,7 +129,7 @@ def _known(description: Any) -> dict[str, Expr]:
 def _wrong(kind: str, entry: Mapping[str, Any]) -> list[str]:
     """What is wrong with a table, of its keys and of the types of their values."""
     keys = (*KINDS[kind].needed, *KINDS[kind].optional, *OF_ALL)
-    problems = [f"{key!r} is {_unknown(key, keys)}" for key in entry if key not in keys]
+    problems = [missing(key, keys, "is unknown") for key in entry if key not in keys]
     problems += [f"{key!r} is missing" for key in KINDS[kind].needed if key not in entry]
     if kind == "bounds" and not {"at_least", "at_most"} & set(entry):
         problems.append("'at_least' or 'at_most' is missing")
@@ -179,9 +179,3 @@ def _made(
 
 def _is_number(value: Any) -> bool:
     return isinstance(value, (int, float)) and not isinstance(value, bool) and np.isfinite(value)
-
-
-def _unknown(what: str, known: Any) -> str:
-    near = difflib.get_close_matches(what, known, 1)
-    meant = f"; did you mean {near[0]!r}?" if near else ""
-    return f"unknown, expected one of {', '.join(known)}{meant}"

@@ -57,37 +57,30 @@ def fit(
     """
     from ...fmu.read import read_description, units_of
     from ...fmu.write import as_fmu, write_whole
-    from ...page.table import new_table, print_whole
-    from ...study.fit.problem import derivatives_of, free_of, measure_of
+    from ...page.table import print_whole
+    from ...study.fit.problem import bounds_of, derivatives_of, deviation_of, named
     from ...study.fit.solve import TOLERANCE
     from ...study.fit.solve import fit as found_by
     from ...verification.exit_codes import FAILS
     from ...verification.junit import text_of
 
-    told = derivatives_of(
-        [text.partition("=")[0].strip() for text in free or ()],
-        [text.partition(":")[0].strip() for text in measure or ()],
-    )
-    with plainly(), as_fmu(target, scene, sensitivities=told) as fmu:
-        units = units_of(read_description(fmu).modelVariables)
-        found = found_by(
-            fmu,
-            [str(p) for p in measured],
-            once(free_of(text, units) for text in free or ()),
-            once(measure_of(text, units) for text in measure or ()),
-            start_values=assignments(set_, lambda: units),
-            offset=offset,
-            loss=loss,
-            tolerance=TOLERANCE if tolerance is None else tolerance,
-            step_size=step_size,
-        )
+    with plainly():
+        sought, wanted = once(named(free or (), "=")), once(named(measure or (), ":"))
+        with as_fmu(target, scene, sensitivities=derivatives_of(sought, wanted)) as fmu:
+            units = units_of(read_description(fmu).modelVariables)
+            found = found_by(
+                fmu,
+                [str(p) for p in measured],
+                {n: bounds_of(n, text, units) for n, text in sought.items()},
+                {n: deviation_of(n, text, units) for n, text in wanted.items()},
+                start_values=assignments(set_, lambda: units),
+                offset=offset,
+                loss=loss,
+                tolerance=TOLERANCE if tolerance is None else tolerance,
+                step_size=step_size,
+            )
         say(found.summary())
-        table = new_table(
-            "", "value", "found", "standard error", "95 % interval", "unit", text=["value", "unit"]
-        )
-        for row in found.rows():
-            table.add_row(*row)
-        print_whole(console, table)
+        print_whole(console, found.table())
         for text in found.remarks():
             say(text, "note:", "yellow")
         if json is not None:

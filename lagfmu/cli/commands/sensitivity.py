@@ -57,6 +57,7 @@ def sensitivity(
     from ...fmu.read import read_description, units_of
     from ...fmu.write import write_whole
     from ...model.selection import listed
+    from ...page.table import print_whole
     from ...study.sensitivity.local import ALL, TOLERANCE, made_for
     from ...study.sensitivity.local import sensitivity as found_by
     from ...study.sensitivity.ranges import over_ranges
@@ -88,7 +89,6 @@ def sensitivity(
                 on=on,
                 **run,
             )
-            _print_indices(found)
         else:
             if on is not None:
                 raise UsageError("--on is for --over")
@@ -100,7 +100,10 @@ def sensitivity(
                 tolerance=TOLERANCE if tolerance is None else tolerance,
                 **run,
             )
-            _print_derivatives(found)
+        for table in found.tables():
+            print_whole(console, table)
+        for text in found.remarks():
+            say(text, "note:", "yellow")
         if json is not None:
             write_whole(json, text_of(found.to_dict()).encode())
             say_wrote(json)
@@ -117,54 +120,3 @@ def _range(text: str) -> tuple[str, tuple[float, float]]:
     if not sign or not math.isfinite(low + high):
         raise UsageError(f"--over {text!r}: expected NAME=LOW:HIGH, finite numbers in SI")
     return name, (low, high)
-
-
-def _print_derivatives(found: Any) -> None:
-    """A table an output: parameter, relative derivative, derivative, why there is none."""
-    from ...model.units import for_reading
-    from ...page.table import new_table, print_whole
-
-    for i, (output, value) in enumerate(found.values.items()):
-        unit = for_reading(found.units.get(output))
-        title = f"{output} = {value:.9g} {unit} at t = {found.stop_time:g} s"
-        head = ("parameter", "% per %", "derivative", "unit", "remark")
-        table = new_table(title, *head, words=["parameter", "unit"], text=["remark"])
-        for k in found.order(i):
-            name = list(found.points)[k]
-            part, slope = found.relative[i, k], found.derivatives[i, k]
-            table.add_row(
-                name,
-                "" if math.isnan(part) else f"{part:+.6f}",
-                "" if math.isnan(slope) else f"{slope:.9g}",
-                f"{unit or '1'} / {for_reading(found.units.get(name)) or '1'}",
-                found.why.get((output, name), ""),
-            )
-        print_whole(console, table)
-    if not found.own.all():
-        these = "derivatives" if not found.own.any() else f"{int((~found.own).sum())} derivatives"
-        ended = ": those of the FMU end within the run (sensitivity.valid)" if found.ended else ""
-        say(
-            f"{these} by central differences of runs, relative step {found.step:.1e}{ended}",
-            "note:",
-            "cyan",
-        )
-
-
-def _print_indices(found: Any) -> None:
-    from ...page.table import new_table, print_whole
-    from ...study.sensitivity.ranges import CONFIDENCE, METHODS
-
-    for output, rows in found.indices.items():
-        title = f"{output}: {found.method}, {found.runs} runs"
-        table = new_table(title, "parameter", *METHODS[found.method], words=["parameter"])
-        for name in found.order(output):
-            cells = []
-            for index in METHODS[found.method]:
-                half = rows[name].get(CONFIDENCE.get(index, ""))
-                cells.append(
-                    f"{rows[name][index]:.4g}" + (f" ± {half:.2g}" if half is not None else "")
-                )
-            table.add_row(name, *cells)
-        print_whole(console, table)
-    for output, reason in found.without.items():
-        say(f"{output}: no indices: it {reason}", "note:", "yellow")

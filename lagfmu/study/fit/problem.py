@@ -8,7 +8,7 @@ lambda.rod:0.1             measured, with a standard deviation of 0.1 in its uni
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -65,23 +65,26 @@ def derivatives_of(free: Iterable[str], measure: Iterable[str]) -> list[str]:
     return [f"{of}:{by}"] if by and of else []
 
 
-def free_of(text: str, units: Mapping[str, str | None]) -> tuple[str, Any]:
-    """NAME, NAME=LOW:HIGH or NAME=LOW:HIGH:START as a name and None or a tuple.  Raises SettingError."""
-    name, sign, given = (part.strip() for part in text.partition("="))
-    if not sign:
-        return name, None
-    parts = given.split(":")
+def named(texts: Iterable[str], sign: str) -> Iterator[tuple[str, str]]:
+    """NAME=LOW:HIGH, or OUTPUT:DEVIATION, as the name and what is behind the sign."""
+    for text in texts:
+        name, _, given = (part.strip() for part in text.partition(sign))
+        yield name, given
+
+
+def bounds_of(name: str, text: str, units: Mapping[str, str | None]) -> tuple[float, ...] | None:
+    """LOW:HIGH or LOW:HIGH:START as numbers; None for nothing.  Raises SettingError."""
+    if not text:
+        return None
+    what, parts = f"--free '{name}={text}'", text.split(":")
     if len(parts) not in (2, 3):
-        raise SettingError(f"--free {text!r}: expected NAME, NAME=LOW:HIGH or NAME=LOW:HIGH:START")
-    return name, tuple(_number(part, units.get(name), f"--free {text!r}") for part in parts)
+        raise SettingError(f"{what}: expected NAME, NAME=LOW:HIGH or NAME=LOW:HIGH:START")
+    return tuple(_number(part, units.get(name), what) for part in parts)
 
 
-def measure_of(text: str, units: Mapping[str, str | None]) -> tuple[str, float | None]:
-    """OUTPUT or OUTPUT:DEVIATION as a name and a number.  Raises SettingError."""
-    name, sign, given = (part.strip() for part in text.rpartition(":"))
-    if not sign:
-        return given, None
-    return name, _number(given, units.get(name), f"--measure {text!r}")
+def deviation_of(name: str, text: str, units: Mapping[str, str | None]) -> float | None:
+    """A standard deviation as a number; None for nothing.  Raises SettingError."""
+    return _number(text, units.get(name), f"--measure '{name}:{text}'") if text else None
 
 
 def _number(text: str, unit: str | None, what: str) -> float:

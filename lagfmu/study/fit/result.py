@@ -7,8 +7,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from rich.markup import escape
+from rich.table import Table
 
 from ...model.units import for_reading
+from ...page.table import as_text, new_table
 from .certainty import LEVEL, Certainty, Combination
 from .problem import Problem
 
@@ -74,24 +77,24 @@ class Fit:
         """Measured numbers less what is free."""
         return len(self.measured) - len(self.x)
 
-    def rows(self) -> list[tuple[str, str, str, str, str]]:
-        """Name, value, standard error, interval of 95 %, unit, as text."""
-        found = []
+    def table(self) -> Table:
+        """A row a value: name, value, standard error, interval of 95 %, unit."""
+        interval = f"{100 * LEVEL:.0f} % interval"
+        head = ("value", "found", "standard error", interval, "unit")
+        drawn = new_table("", *head, text=["value", "unit"])
         for f, error in zip(self.problem.free, self.certainty.errors, strict=True):
             value, (low, high) = self.values[f.name], self.intervals[f.name]
             known = np.isfinite(error)
             plain = "at its bound" if np.isnan(error) else "not determined"
             digits = _digits(value, error)
-            found.append(
-                (
-                    f.name,
-                    f"{value:.{digits}g}",
-                    f"{error:.2g}" if known else plain,
-                    f"{low:.{digits}g} ... {high:.{digits}g}" if known else "",
-                    for_reading(f.unit),
-                )
+            drawn.add_row(
+                escape(f.name),
+                f"{value:.{digits}g}",
+                f"{error:.2g}" if known else plain,
+                f"{low:.{digits}g} ... {high:.{digits}g}" if known else "",
+                for_reading(f.unit),
             )
-        return found
+        return drawn
 
     def remarks(self) -> list[str]:
         """What a reader of the numbers must know."""
@@ -219,13 +222,7 @@ class Fit:
         return draw(self.residuals(), self.deviations, units, self.name, out)
 
     def __repr__(self) -> str:
-        head = ("value", "found", "standard error", f"{100 * LEVEL:.0f} % interval", "unit")
-        rows = [head, *self.rows()]
-        widths = [max(len(r[k]) for r in rows) for k in range(5)]
-        lines = [
-            "  ".join(c.ljust(w) for c, w in zip(r, widths, strict=True)).rstrip() for r in rows
-        ]
-        return "\n".join([self.summary(), *lines, *self.remarks()])
+        return "\n".join([self.summary(), as_text(self.table()), *self.remarks()])
 
     def summary(self) -> str:
         """One line: of what, from how much, with how many runs."""

@@ -15,6 +15,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from rich.markup import escape
+from rich.table import Table
 
 from ... import names
 from ...errors import SettingError, SimulationError
@@ -34,7 +36,9 @@ from ...interface.rules import problems_of, unsettable
 from ...model.model import Model
 from ...model.rule import Rule, missing
 from ...model.scene import Scene
+from ...model.units import for_reading
 from ...numeric.tolerance import tolerance_problem
+from ...page.table import as_text, new_table
 
 Floats = NDArray[np.float64]
 TOLERANCE = 1e-11  # of the runs: their noise limits the differences
@@ -114,16 +118,37 @@ class Sensitivity:
         label = "change of the output by 1 % of the parameter [%]"
         return tornado(dict(zip(self.values, bars, strict=True)), label, self.name, out)
 
-    def __repr__(self) -> str:
-        lines = [f"{self.name} at t = {self.stop_time:g} s"]
-        for i, (o, value) in enumerate(self.values.items()):
-            lines.append(f"{o} = {value:.6g} {self.units.get(o, '')}".rstrip())
+    def tables(self) -> list[Table]:
+        """A table an output: parameter, relative derivative, derivative, why there is none."""
+        found = []
+        for i, (output, value) in enumerate(self.values.items()):
+            unit = for_reading(self.units.get(output))
+            title = f"{output} = {value:.9g} {unit} at t = {self.stop_time:g} s"
+            head = ("parameter", "% per %", "derivative", "unit", "remark")
+            drawn = new_table(escape(title), *head, words=["parameter", "unit"], text=["remark"])
             for k in self.order(i):
-                p = list(self.points)[k]
+                name = list(self.points)[k]
                 part, slope = self.relative[i, k], self.derivatives[i, k]
-                text = self.why.get((o, p)) or f"{slope:.6g}"
-                lines.append(f"  {p:24} {'' if np.isnan(part) else f'{part:+.4f}':>9}  {text}")
-        return "\n".join(lines)
+                drawn.add_row(
+                    escape(name),
+                    "" if np.isnan(part) else f"{part:+.6f}",
+                    "" if np.isnan(slope) else f"{slope:.9g}",
+                    f"{unit or '1'} / {for_reading(self.units.get(name)) or '1'}",
+                    self.why.get((output, name), ""),
+                )
+            found.append(drawn)
+        return found
+
+    def remarks(self) -> list[str]:
+        """Which derivatives are differences of runs."""
+        if self.own.all():
+            return []
+        these = "derivatives" if not self.own.any() else f"{int((~self.own).sum())} derivatives"
+        ended = ": those of the FMU end within the run (sensitivity.valid)" if self.ended else ""
+        return [f"{these} by central differences of runs, relative step {self.step:.1e}{ended}"]
+
+    def __repr__(self) -> str:
+        return "\n".join([self.name, as_text(*self.tables()), *self.remarks()])
 
 
 def sensitivity(

@@ -12,8 +12,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from rich.markup import escape
+from rich.table import Table
 
 from ...errors import SettingError, SimulationError
+from ...page.table import as_text, new_table
 from ..sweep.sweep import sweep
 from ..sweep.table import happened
 
@@ -53,6 +56,31 @@ class Ranges:
             },
             "without": dict(self.without),
         }
+
+    def tables(self) -> list[Table]:
+        """A table an output: parameter, its indices with their intervals."""
+        found = []
+        for output, rows in self.indices.items():
+            title, head = f"{output}: {self.method}, {self.runs} runs", METHODS[self.method]
+            drawn = new_table(escape(title), "parameter", *head, words=["parameter"])
+            for name in self.order(output):
+                halves = [rows[name].get(CONFIDENCE.get(index, "")) for index in head]
+                drawn.add_row(
+                    escape(name),
+                    *(
+                        f"{rows[name][index]:.4g}" + ("" if half is None else f" ± {half:.2g}")
+                        for index, half in zip(head, halves, strict=True)
+                    ),
+                )
+            found.append(drawn)
+        return found
+
+    def remarks(self) -> list[str]:
+        """Of which outputs there are no indices, and why."""
+        return [f"{output}: no indices: it {why}" for output, why in self.without.items()]
+
+    def __repr__(self) -> str:
+        return "\n".join([as_text(*self.tables()), *self.remarks()])
 
     def plot(self, out: Any = None) -> Any:
         """Bars of the main index, the longest on top: a matplotlib Figure or, with `out`, a file."""
