@@ -35,25 +35,6 @@ Arguments = Annotated[
         help="An argument of the file's function 'family', e.g. -p n=8; repeatable.",
     ),
 ]
-Outputs = _listed(
-    "Only these variables as outputs, e.g. lambda.surface,Q.* or 'der(x)'; all else is removed."
-)
-Fixed = _listed(
-    "Parameters that become numbers: m,g at the model's values, g=1.62 at another; * all."
-)
-Inputs = _listed("Only these inputs are driven; the others keep their start values. '' for none.")
-Contacts = _listed("Only these contacts may open; the others hold. '' for none.")
-Frictions = _listed("Only these frictions may slip; what the others limit sticks. '' for none.")
-Methods = _listed("Methods that solver.method can be set to (default with --outputs: one).")
-Method = Annotated[str | None, _needed("The default method.")]
-Formulation = Annotated[str | None, _needed("multipliers, nullspace or minimal.")]
-Derivatives = Annotated[
-    bool | None,
-    _needed(
-        "Directional derivatives in a native FMU (default: unless --outputs).",
-        "--derivatives/--no-derivatives",
-    ),
-]
 AddOutput = Annotated[
     Names,
     _needed(
@@ -63,13 +44,6 @@ AddOutput = Annotated[
         metavar="'NAME = EXPRESSION [UNIT]'",
     ),
 ]
-RealsOnly = Annotated[
-    bool | None,
-    _needed(
-        "Reals for Booleans and counts, and no solver.method: for importers that know Reals alone.",
-        "--reals-only",
-    ),
-]
 ErrorBars = Annotated[
     bool | None,
     _needed(
@@ -77,17 +51,6 @@ ErrorBars = Annotated[
         "--error-bars",
     ),
 ]
-Sensitivities = Annotated[
-    Names,
-    _needed(
-        "Outputs sensitivity.OUTPUT.by.PARAMETER: derivatives along the run, e.g. "
-        "departure.surface.time:theta,a or '*:a'; repeatable. Co-simulation only.",
-        "--sensitivities",
-        metavar="OUTPUT:PARAMETER,...",
-    ),
-]
-Name = Annotated[str | None, _needed("Another name for the FMU.")]
-
 Target = Annotated[
     str | None,
     typer.Option(
@@ -128,21 +91,49 @@ InputFile = Annotated[
 ]
 
 
-OPTIONS = {
-    "outputs": Outputs,
-    "fixed": Fixed,
-    "inputs": Inputs,
-    "contacts": Contacts,
-    "frictions": Frictions,
-    "methods": Methods,
-    "method": Method,
-    "formulation": Formulation,
-    "derivatives": Derivatives,
-    "reals_only": RealsOnly,
+OPTIONS = {  # of a scene, in the order of --help
+    "outputs": _listed(
+        "Only these variables as outputs, e.g. lambda.surface,Q.* or 'der(x)'; all else is removed."
+    ),
+    "fixed": _listed(
+        "Parameters that become numbers: m,g at the model's values, g=1.62 at another; * all."
+    ),
+    "inputs": _listed(
+        "Only these inputs are driven; the others keep their start values. '' for none."
+    ),
+    "contacts": _listed("Only these contacts may open; the others hold. '' for none."),
+    "frictions": _listed(
+        "Only these frictions may slip; what the others limit sticks. '' for none."
+    ),
+    "methods": _listed("Methods that solver.method can be set to (default with --outputs: one)."),
+    "method": Annotated[str | None, _needed("The default method.")],
+    "formulation": Annotated[str | None, _needed("multipliers, nullspace or minimal.")],
+    "derivatives": Annotated[
+        bool | None,
+        _needed(
+            "Directional derivatives in a native FMU (default: unless --outputs).",
+            "--derivatives/--no-derivatives",
+        ),
+    ],
+    "reals_only": Annotated[
+        bool | None,
+        _needed(
+            "Reals for Booleans and counts, and no solver.method: for importers that know Reals alone.",
+            "--reals-only",
+        ),
+    ],
     "error_bars": ErrorBars,
-    "sensitivities": Sensitivities,
-    "name": Name,
-}  # in the order of --help
+    "sensitivities": Annotated[
+        Names,
+        _needed(
+            "Outputs sensitivity.OUTPUT.by.PARAMETER: derivatives along the run, e.g. "
+            "departure.surface.time:theta,a or '*:a'; repeatable. Co-simulation only.",
+            "--sensitivities",
+            metavar="OUTPUT:PARAMETER,...",
+        ),
+    ],
+    "name": Annotated[str | None, _needed("Another name for the FMU.")],
+}
 LISTS = ("outputs", "fixed", "inputs", "contacts", "frictions", "methods")
 # an FMU with one of these shows less than the full one
 NARROWING = (*LISTS, "method", "reals_only")

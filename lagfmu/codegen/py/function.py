@@ -40,20 +40,10 @@ class Printer(PythonCodePrinter):  # type: ignore[misc]
     def _print_Symbol(self, symbol: Expr) -> str:
         return self.names.get(symbol) or str(symbol)
 
-    def _print_Rational(self, number: Expr) -> str:
+    def _double(self, number: Expr) -> str:
         return repr(float(number))
 
-    def _print_Float(self, number: Expr) -> str:
-        return repr(float(number))
-
-    def _print_NumberSymbol(self, number: Expr) -> str:
-        return repr(float(number))
-
-    def _print_Pi(self, number: Expr) -> str:
-        return repr(float(number))
-
-    def _print_Exp1(self, number: Expr) -> str:
-        return repr(float(number))
+    _print_Rational = _print_Float = _print_NumberSymbol = _print_Pi = _print_Exp1 = _double  # noqa: N815
 
     def _print_SplineBase(self, call: Expr) -> str:
         order = f", {call.order}" if call.order else ""

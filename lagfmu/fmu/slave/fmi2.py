@@ -55,6 +55,22 @@ def guarded(method: Call) -> Call:
     return call  # type: ignore[return-value]
 
 
+def _getter(kind: str, as_kind: Callable[[Any], Any]) -> Callable[..., list[Any]]:
+    @guarded
+    def get(self: LagfmuSlave, vrs: list[int]) -> list[Any]:
+        return [as_kind(x) for x in self.run.get(vrs, kind)]
+
+    return get
+
+
+def _setter(kind: str) -> Callable[..., None]:
+    @guarded
+    def put(self: LagfmuSlave, vrs: list[int], values: list[Any]) -> None:
+        self.run.set(vrs, values, kind)
+
+    return put
+
+
 class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
     """A simulation behind the FMI functions; the generated subclass gives its `facts`."""
 
@@ -95,45 +111,11 @@ class LagfmuSlave(Fmi2Slave):  # type: ignore[misc]
             return False
         return True
 
-    @guarded
-    def get_real(self, vrs: list[int]) -> list[float]:
-        """Values of Real variables."""
-        return [float(x) for x in self.run.get(vrs, "Real")]
-
-    @guarded
-    def get_integer(self, vrs: list[int]) -> list[int]:
-        """Values of Integer variables."""
-        return [int(x) for x in self.run.get(vrs, "Integer")]
-
-    @guarded
-    def get_boolean(self, vrs: list[int]) -> list[bool]:
-        """Values of Boolean variables."""
-        return [bool(x) for x in self.run.get(vrs, "Boolean")]
-
-    @guarded
-    def get_string(self, vrs: list[int]) -> list[str]:
-        """Values of String variables: there are none."""
-        return [str(x) for x in self.run.get(vrs, "String")]
-
-    @guarded
-    def set_real(self, vrs: list[int], values: list[float]) -> None:
-        """Set parameters, start values (before the end of initialization) or inputs."""
-        self.run.set(vrs, values, "Real")
-
-    @guarded
-    def set_integer(self, vrs: list[int], values: list[int]) -> None:
-        """Set `solver.method`, an Enumeration; no other Integer can be set."""
-        self.run.set(vrs, values, "Integer")
-
-    @guarded
-    def set_boolean(self, vrs: list[int], values: list[bool]) -> None:
-        """No Boolean can be set."""
-        self.run.set(vrs, values, "Boolean")
-
-    @guarded
-    def set_string(self, vrs: list[int], values: list[str]) -> None:
-        """No variable is a String."""
-        self.run.set(vrs, values, "String")
+    # of a kind each; what can be set are parameters, start values and inputs
+    get_real, get_integer = _getter("Real", float), _getter("Integer", int)
+    get_boolean, get_string = _getter("Boolean", bool), _getter("String", str)
+    set_real, set_integer = _setter("Real"), _setter("Integer")
+    set_boolean, set_string = _setter("Boolean"), _setter("String")
 
     @guarded
     def _get_fmu_state(self) -> dict[str, Any]:
