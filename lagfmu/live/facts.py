@@ -16,6 +16,7 @@ from ..fmu.archive import pack
 from ..fmu.read import described_rules, experiment_of, kind_of
 from ..model.rule import MESSAGES, Rule
 from ..model.units import for_reading
+from ..page.groups import heading
 from ..page.preset import SETTABLE
 
 # of a variable; `reference`: its place.  What is seldom usual comes first
@@ -26,18 +27,6 @@ USUAL: dict[str, Any] = {
     **{"event": False, "items": [], "reference": None},
 }
 NUMBERS = ("Real", "Integer", "Boolean")
-GROUPS = {  # by the kind of what a variable is of
-    names.MULTIPLIER: "Multipliers λ",
-    **dict.fromkeys(names.OF_FRICTION, "Friction"),
-    names.FORCE: "Generalized forces of constraint",
-    names.ENERGY: "Energies",
-    names.RESIDUAL: "Residuals, zero where a constraint acts",
-    names.UNIQUE: "Whether λ is determined",
-    **dict.fromkeys((names.CONTACT, names.DEPARTURE, names.CLOSING), "Contacts"),
-    names.ERROR: "Error bars",
-    names.PEAK: "Extremes so far",
-    names.SOLVER: "Solver",
-}
 
 
 def facts(
@@ -94,7 +83,7 @@ def _variable(v: Any, rule: Rule, named: set[str]) -> dict[str, Any]:
         "reference": int(v.valueReference),
         "type": kind_of(v),
         "role": role,
-        "group": _group(v, role, named),
+        "group": heading(v.name, role, named),
         "unit": for_reading(v.unit),
         "start": _number(v),
         "items": [{"name": item, "value": number} for item, number in rule.items.items()],
@@ -127,17 +116,3 @@ def _number(v: Any) -> float | str | None:
     if kind_of(v) == "Boolean":
         return float(str(v.start).lower() in ("true", "1"))
     return float(v.start)
-
-
-def _group(v: Any, role: str, named: set[str]) -> str:
-    """The heading under which a curve stands."""
-    of = names.read(v.name)
-    if of.quantity == names.FORCE and of.constraint:
-        return "Forces of each constraint"
-    if of.quantity == names.RESIDUAL and names.name(names.CONTACT, of.constraint) in named:
-        return "Gaps of contacts"
-    if of.head in GROUPS:
-        return GROUPS[of.head]
-    if of.order:
-        return "Accelerations" if of.order == 2 else "Velocities"
-    return "Coordinates" if role == "start" or names.derivative(v.name) in named else "Outputs"

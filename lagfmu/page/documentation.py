@@ -8,18 +8,17 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from latex2mathml.converter import convert
 from markupsafe import Markup
 
 from .. import names
-from ..interface.further import INTERFACE
-from ..interface.variables import Variable
+from ..interface.variables import Variable, VariableTable
 from ..model.model import Contact, Holonomic, Nonholonomic
 from ..model.units import Unit, for_reading
 from ..numeric.start_priority import OMITTED
 from ..prepare.prepare import Prepared
+from .groups import heading
 from .savings import savings
 from .template import template
 from .typeset import typeset
@@ -34,50 +33,14 @@ MEANING = {
 }
 LINK, FIGURES = "<!-- link to the figures -->", "<!-- figures of a verification -->"
 KINDS = {Holonomic: "holonomic", Nonholonomic: "nonholonomic (Pfaffian)", Contact: "contact"}
-GROUPS = (
-    ("Parameters", "Set them before initialization."),
-    ("Inputs", "Set them between communication steps."),
-    ("Motion", "Coordinates, velocities and accelerations."),
-    ("Multipliers and constraints", "Residuals are zero up to rounding while a constraint acts."),
-    (
-        "Generalized forces of constraint",
-        "Q of a coordinate is the sum of the constraints' shares.",
-    ),
-    ("Energies", ""),
-    ("Outputs of the model", "What they are made of stands among the equations."),
-    ("Contacts", ""),
-    ("Extremes", "Of the continuous motion so far, between communication points too."),
-    ("Friction", "Sticking, slip velocities, and what is left before a contact slips."),
-    ("Solver", "Method, accuracy, and what was done."),
-    ("Of FMI 3.0 alone", "Time, event indicators, residuals, clocks and arrays."),
-)
+REMARKS = {
+    "Parameters": "Set them before initialization.",
+    "Inputs": "Set them between communication steps.",
+    "Outputs": "Those of the model's own: what they are made of stands among the equations.",
+}
 # what MathML knows of a bracket: at the ends of its row it is a fence, which stretches
 BRACKET = re.compile(r'<mo fence="true" form="\w+" stretchy="true">([()\[\]])</mo>')
 AFTER_FACTOR = re.compile(r"(?<=[\w})]) (?=\\(?:a?(?:sin|cos|tan)h?|log|exp|operatorname)\b)")
-TITLES = {  # by the kind of what a variable is of
-    "energy": "Energies",
-    "solver": "Solver",
-    names.OWN: "Outputs of the model",
-    names.PEAK: "Extremes",
-    names.FORCE: "Generalized forces of constraint",
-    **dict.fromkeys((names.CONTACT, names.DEPARTURE, names.CLOSING), "Contacts"),
-    **dict.fromkeys(
-        (names.MULTIPLIER, names.RESIDUAL, names.UNIQUE), "Multipliers and constraints"
-    ),
-    **dict.fromkeys(names.OF_FRICTION, "Friction"),
-}
-
-
-@dataclass(frozen=True)
-class Line:
-    """One line of the variable table."""
-
-    name: str
-    causality: str
-    kind: str
-    unit: str
-    start: str
-    description: str
 
 
 def page(
@@ -127,7 +90,7 @@ def page(
             )
             for m in structure.start.moved
         ],
-        groups=_grouped(table.variables),
+        groups=_grouped(table),
         inputs=[v.name for v in table.variables if v.causality == "input"],
         prescribed=bool(prepared.system.prescribed),
         tolerance=f"{prepared.scene.tolerance:g}",
@@ -155,19 +118,14 @@ def as_given(v: Variable) -> str:
     return f" ({v.display.from_si(v.start):.15g} {v.display.name})"
 
 
-def _grouped(variables: Sequence[Variable]) -> list[tuple[str, str, list[Line]]]:
-    rows: dict[str, list[Line]] = {title: [] for title, _ in GROUPS}
-    for v in variables:
+def _grouped(table: VariableTable) -> list[tuple[str, str, list[tuple[Variable, str, str]]]]:
+    """Of each heading what it says besides, and its variables with unit and start."""
+    rows: dict[str, list[tuple[Variable, str, str]]] = {}
+    for v in table.variables:
         start = "" if v.start is None else f"{v.start}{as_given(v)}"
-        row = Line(v.name, v.causality, v.kind, shown(v.unit), start, v.description)
-        rows[_group(v)].append(row)
-    return [(title, remark, rows[title]) for title, remark in GROUPS if rows[title]]
-
-
-def _group(v: Variable) -> str:
-    by_role = {"parameter": "Parameters", "input": "Inputs", "start": "Motion"}
-    by_role |= {"estimate": "Inputs", INTERFACE: "Of FMI 3.0 alone"}
-    return by_role.get(v.role) or TITLES.get(v.of.head, "Motion")
+        title = heading(v.name, v.role, table.position)
+        rows.setdefault(title, []).append((v, shown(v.unit), start))
+    return [(title, REMARKS.get(title, ""), of) for title, of in rows.items()]
 
 
 def with_figures(text: str, figures: Sequence[tuple[str, ...]], references: str = "") -> str:
