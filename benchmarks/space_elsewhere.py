@@ -14,6 +14,8 @@ from linkage import Tie
 from loops_elsewhere import PARTS
 from rods_elsewhere import DECADES, Peer, Run, by_scipy
 from space import Space
+from space_drake import drake_tree
+from space_heyoka import heyoka_tree
 from system import G
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -260,8 +262,13 @@ def pinocchio_tree(problem: Space, tolerance: float) -> Run:
 
 
 PEERS = [
+    Peer(
+        "Drake, joints and bushings, third order", "drake", DECADES[:8], drake_tree("runge_kutta3")
+    ),
+    Peer("Drake, joints and bushings, Radau", "drake", DECADES[:8], drake_tree("radau3")),
     Peer("exudyn, bodies, generalized alpha", "exudyn", PARTS, exudyn_bodies(False)),
     Peer("exudyn, bodies, index 2", "exudyn", PARTS, exudyn_bodies(True)),
+    Peer("heyoka, joints by its own differentiation", "heyoka", DECADES[2:], heyoka_tree),
     Peer("MuJoCo, hinges and `connect`", "mujoco", PARTS, mujoco_tree),
     Peer("Pinocchio, hinges and constraints, SciPy's DOP853", "pin", DECADES, pinocchio_tree),
 ]
