@@ -57,7 +57,7 @@ TRIED_ELSEWHERE = (
     "libcosimpy",
     "ecospy",
     "optuna",
-    "gemseo_fmu",
+    "pymoo",
 )  # with FMUs, as printed
 # studies, and what writes files that are there already: tried in tests of their own
 LONG = ("new", "tradeoff", "stress", "sweep", "sensitivity", "fit", "report", "page")
