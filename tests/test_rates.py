@@ -14,7 +14,7 @@ from sympy import symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Contact, Holonomic, Input, Model, Nonholonomic, Parameter, Scene, simulate
-from lagfmu.errors import ModelError
+from lagfmu.errors import LagfmuWarning, ModelError
 
 W = np.pi / 8.0
 
@@ -48,6 +48,16 @@ def test_a_motion_that_is_half_connected_is_told(connected, fmu):
     (text,) = told(fmu("Crane"), 0.1, connected)
     for part in ("prescribed motion l has moved", "connect all three", 'rates="estimated"'):
         assert part in text
+
+
+def test_a_table_without_rates_is_told_by_simulate(native_fmu):
+    """A hoist at 0.5 m/s whose rates the table leaves out: the rope's force lacks its inertia, and who
+    simulates hears it from the FMU, once."""
+    table = np.array([(0.0, 7.0), (2.0, 8.0)], dtype=[("time", float), ("l", float)])
+    still = {"der(l)": 0.0, "der(x)": 0.0, "der(y)": 0.0}
+    with pytest.warns(LagfmuWarning, match="prescribed motion l has moved") as heard:
+        simulate(native_fmu("Crane"), 2.0, 0.1, start_values=still, inputs=table)
+    assert sum(issubclass(w.category, LagfmuWarning) for w in heard) == 1
 
 
 @pytest.mark.parametrize("h", [0.02, 0.1, 0.5, 1.0])

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .. import names
-from ..errors import SettingError, SimulationError
+from ..errors import LagfmuWarning, SettingError, SimulationError
 from ..fmu import native
 from ..fmu.inputs import check_inputs, columns_at, jumps
 from ..fmu.read import (
@@ -50,7 +50,14 @@ STARTS = re.compile(rf"start value .* misses the constraints|{LEFT_OUT}")  # a m
 BARS = "error bars"  # begins a message of them
 
 
-class ErrorBarWarning(UserWarning):
+MOST = 5  # warnings that are told one by one
+
+
+class FmuWarning(LagfmuWarning):
+    """What the FMU itself warned of in a run."""
+
+
+class ErrorBarWarning(FmuWarning):
     """Error bars that are lost from some time on."""
 
 
@@ -79,9 +86,8 @@ def simulate(
     recorded too.  `error_bars`: a model's outputs have `error.NAME` beside them (docs/error_bars.md), as
     those of an FMU have that was built with them.
 
-    Warns of each start value that is moved onto the constraints (starts.py), and of error bars that are
-    lost.  Raises ModelError for a model
-    that cannot start, SimulationError if a step fails, and
+    Warns of each start value that is moved onto the constraints (starts.py), and of what the FMU itself warns
+    of.  Raises ModelError for a model that cannot start, SimulationError if a step fails, and
     VerificationError for a file that is no FMU.
     """
     for what, number in (("stop_time", stop_time), ("step_size", step_size)):
@@ -160,7 +166,7 @@ def _ran(target: Path | InProcess, called: str, asked: _Asked) -> Trajectory:
 
 
 def _run(session: Session, called: str, asked: _Asked) -> Run:
-    """A run of a session; what it tells of its start and of error bars becomes warnings."""
+    """A run of a session; what it warns of becomes warnings."""
     inputs, known, rules = asked.inputs, session.experiment, session.rules
     check_inputs(inputs, rules, session.inputs)
     if problems := problems_of(rules, asked.values):
@@ -174,10 +180,18 @@ def _run(session: Session, called: str, asked: _Asked) -> Run:
     tolerance = asked.tolerance or known.tolerance
     run = session.run(every.tolist(), given, tolerance, read, fed, late=True)
     tell(text for _, text in session.messages if STARTS.search(text))
-    for status, text in session.messages:
-        if status == WARNING and text.startswith(BARS):
-            warnings.warn(text, ErrorBarWarning, stacklevel=4)
+    _pass_on([text for status, text in session.messages if status == WARNING])
     return replace(run, rows=run.rows[np.isin(run.rows["time"], times)])
+
+
+def _pass_on(said: Sequence[str]) -> None:
+    """The FMU's warnings, but for those of moved starts, each once and the first MOST of them."""
+    told = [text for text in dict.fromkeys(said) if not STARTS.search(text)]
+    for text in told[:MOST]:
+        kind = ErrorBarWarning if text.startswith(BARS) else FmuWarning
+        warnings.warn(text, kind, stacklevel=5)
+    if len(told) > MOST:
+        warnings.warn(f"the FMU warned of {len(told) - MOST} more", FmuWarning, stacklevel=5)
 
 
 def steps_of(table: Trajectory) -> int:
