@@ -97,8 +97,8 @@ static Status project_positions(Mechanism *b, Instant at, double *q, const doubl
         if (measure(b, at, q, offset, span, &miss) == FAILED) return FAILED;
         *moved = count > 0;
         if (miss.rounding || miss.error < DBL_EPSILON * DBL_EPSILON) return OK;
-        if (miss.error > before / 2 && (miss.error < (kept ? PROJECTION_ROUNDING : PROJECTION_SMALL) ||
-                                        miss.turned < PROJECTION_ROUNDING))
+        if (miss.error > before / 2 && !kept &&
+            (miss.error < PROJECTION_SMALL || miss.turned < PROJECTION_ROUNDING))
             return OK; /* rounding in f is left */
         if (count == PROJECTION_ITERATIONS && miss.error < PROJECTION_ROUNDING) return OK;
         if (count == PROJECTION_ITERATIONS) return no_arrival(b, at, &miss, before);

@@ -150,7 +150,8 @@ class Bench:
                 # of a start that was projected onto 0
                 rounding = ROUNDING * abs(run.values.get(q, 0.0))
                 place = np.where(place > rounding, place, 0.0)
-                size = np.maximum(place, self.facts.same_unit(q, run.values))
+                bare = not any(self.facts.dimensions[q])  # as the parts of a unit quaternion
+                size = np.maximum(place, 1.0 if bare else self.facts.same_unit(q, run.values))
                 size = np.where(size > 0, size, 1.0)
                 v = np.abs(run.rows[names.derivative(q)])
                 vdot = np.abs(run.rows[names.derivative(q, 2)])

@@ -27,19 +27,22 @@ from numpy.typing import NDArray
 
 from ... import names
 from ...fmu.closed_forms import CarriedForm
+from ...fmu.read import Trajectory
 from ...model.elements import Expr
 from ...verification.closed_forms import applies
 from ...verification.evaluate import Compiled
 from .player import Run
 
 LEEWAY = 10.0
-EQUATION = "Lagrange's equation of "  # what the laws of a model begin with (lagrange.py)
+EQUATION = "Lagrange's equation of "  # what the laws of a model begin with (lagrange.py), ...
+MASSLESS = EQUATION + "massless "  # ... of a coordinate that has no place in the metric of M, ...
+RATE = "d2/dt2 of "  # ... of a constraint
 SLOW = 1e-9  # of the fastest slip: one that has no direction yet
 Column = NDArray[np.float64]
 
 
 def magnitude(e: Expr) -> Expr:
-    """The sum of the magnitudes of an expression's terms; f(x): |f(x)| + |x f'(x)|."""
+    """The sum of the magnitudes of an expression's terms; f(x): |f(x)| + |x f'(x)|, of each argument."""
     if e.is_Atom:
         return sp.Abs(e)
     if e.is_Add:
@@ -50,11 +53,14 @@ def magnitude(e: Expr) -> Expr:
         if e.exp.is_positive:
             return magnitude(e.base) ** e.exp
         return sp.Abs(e) * magnitude(e.base) / sp.Abs(e.base)
-    if isinstance(e, sp.Function) and len(e.args) == 1 and not e.has(sp.Piecewise, sp.floor):
-        x = sp.Dummy("x", real=True)
-        slope = e.func(x).diff(x).xreplace({x: e.args[0]})
-        if not slope.has(sp.Derivative, sp.Subs, sp.DiracDelta):  # else a jump or no formula
-            return sp.Abs(e) + sp.Abs(slope) * magnitude(e.args[0])
+    if isinstance(e, sp.Function) and not e.has(sp.Piecewise, sp.floor):
+        arguments = {sp.Dummy(f"x{k}", real=True): a for k, a in enumerate(e.args)}
+        slopes = {x: e.func(*arguments).diff(x) for x in arguments}
+        if not any(s.has(sp.Derivative, sp.Subs, sp.DiracDelta) for s in slopes.values()):
+            shaken = (
+                sp.Abs(s.xreplace(arguments)) * magnitude(arguments[x]) for x, s in slopes.items()
+            )
+            return sp.Add(sp.Abs(e), *shaken)  # else a jump or no formula
     return sp.Abs(e)
 
 
@@ -64,6 +70,7 @@ class JudgedForm:
 
     `instantaneous`: it relates the outputs of one instant, so that no error of the integration enters;
     `law`: an equation that is solved at that instant, so that nothing but its own terms is its size;
+    `scale` is a further size: of an equation what its terms do not show, of a RATE relative to S.
     """
 
     closed_form: CarriedForm
@@ -73,6 +80,22 @@ class JudgedForm:
     pointwise: bool
     instantaneous: bool
     law: bool
+    scale: Compiled | None = None
+
+    @property
+    def in_metric(self) -> bool:
+        """Whether it is one of the equations of which S is made."""
+        name = self.closed_form.name
+        return name.startswith(EQUATION) and not name.startswith(MASSLESS)
+
+    def terms(self, run: Run) -> Column:
+        """What it adds to S at each row."""
+        return self._terms(run.rows, run) if self.in_metric else np.zeros(len(run.rows))
+
+    def _terms(self, rows: Trajectory, run: Run) -> Column:
+        parts = [*self.sizes, *filter(None, [self.scale])]
+        found = (np.abs(s.at(rows, run.rows, run.values)) for s in parts)
+        return sum(found, np.zeros(len(rows)))
 
     def judge(
         self,
@@ -80,11 +103,13 @@ class JudgedForm:
         growth: Column,
         undisturbed: NDArray[np.bool_],
         floors: Mapping[str, float],
+        S: Column,
     ) -> tuple[float, float, int]:
         """(largest error, what is allowed there, points).
 
         `growth` is max(1, N) at each row; `undisturbed` are the rows before the first impact, where
-        also that may be judged which speaks of the start; `floors` as in Compiled.at.
+        also that may be judged which speaks of the start; `floors` as in Compiled.at; `S` is the sum of the
+        equations' terms.
         """
         chosen = applies(self.closed_form, run.rows, run.values)
         if not self.instantaneous:
@@ -102,6 +127,11 @@ class JudgedForm:
         least = None if self.law else floors
         sizes = [np.abs(s.at(rows, result, values, least)) for s in self.sizes]
         sizes.append(np.abs(expected))
+        if self.closed_form.name.startswith(EQUATION):
+            sizes.append(S[chosen] if self.in_metric else self._terms(rows, run))
+        elif self.scale is not None:
+            within = S[chosen] if self.closed_form.name.startswith(RATE) else 1.0
+            sizes.append(np.abs(self.scale.at(rows, result, values, least)) * within)
         for s in sizes:
             known &= np.isfinite(s)
         if not known.any():
@@ -158,17 +188,17 @@ def laws(closed_forms: tuple[CarriedForm, ...]) -> tuple[JudgedForm, ...]:
 
 def _judged(c: CarriedForm, instantaneous: bool, law: bool, inputs: set[str]) -> JudgedForm:
     parts = [c.actual] + ([] if c.expected is None else [c.expected])
-    scale = [] if c.scale is None else [sp.sympify(c.scale)]
-    # a difference of velocities is not one of the magnitudes that they have at least (Compiled.at)
-    sizes = [magnitude(e) for e in map(sp.sympify, parts)] + [
-        e if law else magnitude(e) for e in scale
-    ]
+    scale = None if c.scale is None else sp.sympify(c.scale)
+    if scale is not None and not law:
+        # a difference of velocities is not one of the magnitudes that they have at least (Compiled.at)
+        scale = magnitude(scale)
     return JudgedForm(
         c,
         Compiled(c.actual, c.name),
         None if c.expected is None else Compiled(c.expected, c.name),
-        tuple(Compiled(e, c.name) for e in sizes),
+        tuple(Compiled(magnitude(e), c.name) for e in map(sp.sympify, parts)),
         instantaneous or not inputs,
         instantaneous,
         law,
+        None if scale is None else Compiled(scale, c.name),
     )

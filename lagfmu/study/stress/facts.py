@@ -91,6 +91,15 @@ class Facts:
         peers = (abs(s.start) for s in self.starts if self.alike(s.name, coordinate))
         return max(peers, default=0.0) or 1.0
 
+    def nominal(self, name: str) -> float:
+        """The largest nominal among variables of the same unit, to which the tolerance is relative, or 0."""
+        peers = (
+            float(v.nominal)
+            for v in self.variables.values()
+            if v.nominal is not None and self.alike(v.name, name)
+        )
+        return max(peers, default=0.0)
+
     def same_unit(self, name: str, values: Mapping[str, float]) -> float:
         """The largest magnitude among the parameters that have the dimension of `name`, or 0."""
         peers = (abs(values[p.name]) for p in self.parameters if self.alike(p.name, name))

@@ -29,6 +29,7 @@ from .player import Run
 
 EPS = float(np.finfo(float).eps)
 ROUNDING = 200 * EPS  # of a residual, relative to its own size
+TIED = 4.0  # of a joint's row, as sizes: in the attitudes of two bodies it is of second degree
 NOTHING = EPS**2 / ROUNDING  # of the usual place: the square of its rounding is nothing
 GAP = 4e-9  # of f's own size: nearer than a quarter of that a contact touches
 Column = NDArray[np.float64]
@@ -66,13 +67,14 @@ def invariants(facts: Facts, run: Run, forms: Sequence[JudgedForm], elapsed: Col
     checks = [replace(c, instant=True) for c in checks]
     digits = not lost(facts, run)
     before, floors = ~landed(run.rows), magnitudes(facts, run)
+    S = sum((form.terms(run) for form in forms), np.zeros(len(run.rows)))
     for form in forms:
         if run.driven and not form.pointwise:  # it says something of the motion without inputs
             continue
         if not (digits or form.instantaneous):
             continue
         error, allowed, points = form.judge(
-            run, np.maximum(1.0, elapsed) * wound(facts, run), before, floors
+            run, np.maximum(1.0, elapsed) * wound(facts, run), before, floors, S
         )
         if points:
             checks.append(Check(form.closed_form.name, error, allowed, form.instantaneous))
@@ -108,8 +110,9 @@ def magnitudes(facts: Facts, run: Run) -> dict[str, float]:
 
     A coordinate is known to the rounding of the value that it was given at the start, however small the
     one is onto which that was projected; a velocity to what would move the coordinate by its rounding within
-    the run, or the default experiment if that is shorter (forces balance no better for lasting longer); the
-    energy to the work of Q over the rounding of the sizes.
+    the run, or the default experiment if that is shorter (forces balance no better for lasting longer); one
+    that stays within the tolerance of rest is measured by its nominal; the energy to the work of Q over the
+    rounding of the sizes.
     """
     found = {}
     work, span = 0.0, float(run.rows["time"][-1] - run.rows["time"][0])
@@ -120,7 +123,9 @@ def magnitudes(facts: Facts, run: Run) -> dict[str, float]:
         fastest = max(float(np.abs(run.rows[names.derivative(p)]).max()) for p in peers)
         size = max(found[q] or facts.usual(q), float(np.abs(run.rows[q]).max()))
         creep = EPS * (size / min(span, facts.stop_time)) if span > 0 else 0.0
-        found[names.derivative(q)] = max(fastest, creep)
+        nominal = facts.nominal(names.derivative(q))
+        rests = fastest <= run.tolerance * nominal
+        found[names.derivative(q)] = nominal if rests else max(fastest, creep)
         if names.name(names.FORCE, "", q) in facts.variables:
             work += EPS * size * float(np.abs(run.rows[names.name(names.FORCE, "", q)]).max())
     moved = [n for n in facts.dimensions if names.derivative(n) in facts.dimensions]
@@ -173,7 +178,7 @@ def _size(facts: Facts, run: Run, constraint: str) -> Column | None:
         least = max(facts.same_unit(residual, run.values), NOTHING * facts.usual(residual))
         if not any(facts.dimensions[residual][:-1]):
             least = max(least, 1.0)  # of axes of length 1, and of angles
-        size = np.maximum(_largest_peer(facts, run, residual), least)
+        size = TIED * np.maximum(_largest_peer(facts, run, residual), least)
     for q, share in shares.items():
         if share is None:
             continue

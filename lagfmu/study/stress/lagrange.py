@@ -14,17 +14,20 @@ determine the accelerations, lambda and Q: nothing of the FMU's own derivation, 
 in them.  A solution of linear equations that is stable fulfils them to rounding, however badly they
 are conditioned (Higham, Accuracy and Stability of Numerical Algorithms, sect. 7.1), in the metric of
 M: relative to  sqrt(M_jj) S  and  S sum_j |a_j| / sqrt(M_jj) ,  S = sum_k |terms of equation k| / sqrt(M_kk),
-where the terms of Q_j are its shares.
+where the terms of Q_j are its shares.  So equation j is held divided by sqrt(M_jj), and S is summed from what
+the equations are on the run: written out in each of them it would make them grow with their square.  `scale`
+has the shares alone.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import sympy as sp
+from sympy.core.function import AppliedUndef
 from sympy.core.relational import Relational
 
 from ... import names
@@ -32,12 +35,12 @@ from ...fmu.closed_forms import pack_closed_forms
 from ...mechanics.attitudes import angular_velocity
 from ...model.attitude import written_out
 from ...model.closed_form import TIME, ClosedForm, in_variables, output
-from ...model.elements import Constraint, Expr
+from ...model.elements import Constraint, Expr, Tie
 from ...model.model import Contact, Friction, Model, Nonholonomic, name_of
 from ...model.speeds import quaternions
 from ...numeric.closed import across
 from ...prepare.prepare import Prepared
-from .closed_forms import EQUATION, SLOW, magnitude
+from .closed_forms import EQUATION, MASSLESS, RATE, SLOW, magnitude
 from .facts import beside
 
 ROUNDING = 1e-13  # relative to those terms; see closed_forms.LEEWAY
@@ -55,16 +58,16 @@ def lay_beside(fmu: Path, prepared: Prepared) -> None:
 
 def lagrange(model: Model, variables: frozenset[str]) -> list[ClosedForm]:
     """The equations that can be held against an FMU with these variables."""
-    sides, masses, terms = _sides(model, variables)
-    forms = []
+    sides, masses = _sides(model, variables)
+    shares = _shares(sides, model, variables)
+    forms, when = [], _beside_jumps(model)
     for q, (inertia, force) in sides.items():
-        others = [
-            sp.sqrt(masses[q] / masses[k]) * terms[k] for k in sides if k != q and masses[k] != 0
-        ]
-        name, scale = EQUATION + name_of(q), sp.Add(terms[q], *others)
-        when = _beside_jumps(model)
-        forms.append(ClosedForm(name, force, inertia, scale=scale, when=when, rounding=ROUNDING))
-    forms += _of_constraints(model, _alone(masses, terms))
+        name, weight = EQUATION + name_of(q), sp.sqrt(masses[q])
+        if weight == 0:
+            name, weight = MASSLESS + name_of(q), sp.S.One
+        left, right, scale = (e / weight for e in (inertia, force, shares[q]))
+        forms.append(ClosedForm(name, right, left, scale=scale, when=when, rounding=ROUNDING))
+    forms += _of_constraints(model, {q: 1 / sp.sqrt(M) for q, M in masses.items() if M != 0})
     forms += _of_shares(model, variables)
     for law in model.frictions:
         forms += _of_friction(model, law)
@@ -92,36 +95,28 @@ def _beside_jumps(model: Model) -> Expr | None:
     return sp.Mul(*beside) if beside else None
 
 
-def _sides(model: Model, variables: frozenset[str]) -> tuple[Any, Any, Any]:
-    """Of each coordinate or angular velocity: the two sides of its equation, the mass, and the magnitude of
-    all terms."""
+def _sides(model: Model, variables: frozenset[str]) -> tuple[Any, Any]:
+    """Of each coordinate or angular velocity: the two sides of its equation, and the mass."""
     L, left, masses = written_out(model.energy_expression), {}, {}
     for q in model.coordinates:
         if q not in model.kinematics:
             left[q] = L.diff(q.diff(TIME)).diff(TIME) - L.diff(q)
             masses[q] = sp.Abs(in_variables(L.diff(q.diff(TIME), 2)))
     rates = {q: written_out(sp.sympify(rate)) for q, rate in model.kinematics.items()}
+    slope = {q: L.diff(q) for q in rates}
     for four in quaternions(model):
         turning = angular_velocity(model, four) or ()
         momentum = [L.diff(w) for w in turning]
         for w, spin, bend in zip(turning, momentum, across(turning, momentum), strict=True):
-            along = sp.Add(*(L.diff(q) * rate.diff(w) for q, rate in rates.items()))
+            along = sp.Add(*(slope[q] * rate.diff(w) for q, rate in rates.items() if rate.has(w)))
             left[w] = spin.diff(TIME) + bend - along
             masses[w] = sp.Abs(in_variables(L.diff(w, 2)))
-    shares, sides = _shares(left, model, variables), {}
+    sides = {}
     for q, side in left.items():
         name = names.name(names.FORCE, "", name_of(q))
         force = written_out(sp.sympify(model.forces.get(q, 0)))
         sides[q] = (side, force + (output(name) if name in variables else 0))
-    terms = {q: sum(map(magnitude, map(in_variables, sides[q])), shares[q]) for q in sides}
-    return sides, masses, terms
-
-
-def _alone(masses: Mapping[Expr, Expr], terms: Mapping[Expr, Expr]) -> dict[Expr, Expr]:
-    """S / sqrt(M_jj): what the terms would make of each acceleration in the metric of M."""
-    heavy = [q for q in masses if masses[q] != 0]
-    total = sp.Add(*(terms[q] / sp.sqrt(masses[q]) for q in heavy))
-    return {q: total / sp.sqrt(masses[q]) for q in heavy}
+    return sides, masses
 
 
 def _shares(of: Iterable[Expr], model: Model, variables: frozenset[str]) -> dict[Expr, Expr]:
@@ -130,6 +125,13 @@ def _shares(of: Iterable[Expr], model: Model, variables: frozenset[str]) -> dict
     for q in of:
         known = [names.name(names.FORCE, c.name, name_of(q)) for c in model.constraints]
         found[q] = sp.Add(*(sp.Abs(output(n)) for n in known if n in variables))
+    for tie in (c for c in model.constraints if isinstance(c, Tie)):
+        rate = written_out(
+            tie.rates[0]
+        )  # linear in the angular velocities, for which no share is reported
+        push = output(names.name(names.MULTIPLIER, tie.name))
+        for w in found.keys() & rate.atoms(AppliedUndef):
+            found[w] += sp.Abs(push * in_variables(rate.diff(w)))
     return found
 
 
@@ -176,10 +178,10 @@ def _of_shares(model: Model, variables: frozenset[str]) -> list[ClosedForm]:
         f, lam = sp.sympify(c.expression), output(names.name(names.MULTIPLIER, c.name))
         contact = c.name if isinstance(c, Contact) else c.while_closed
         for q in model.coordinates:
-            a = _along(c, q)
             share = names.name(names.FORCE, c.name, name_of(q))
             if share in variables:
-                found.append(ClosedForm(share, lam * a, output(share), rounding=ROUNDING))
+                expected = lam * _along(c, q)
+                found.append(ClosedForm(share, expected, output(share), rounding=ROUNDING))
         rounding, residual = (
             ROUNDING if contact is None else GAP,
             names.name(names.RESIDUAL, c.name),
@@ -197,7 +199,8 @@ def _along(constraint: Constraint, q: Expr) -> Expr:
 
 
 def _of_constraints(model: Model, accelerations: dict[Expr, Expr]) -> list[ClosedForm]:
-    """Without those in attitudes, of which formulas of two derivatives would take a page each."""
+    """Where S makes these accelerations.  Without those in attitudes, of which formulas of two derivatives
+    would take a page each."""
     found = []
     for c in model.constraints:
         rate, along = sp.sympify(c.expression), accelerations
@@ -212,7 +215,7 @@ def _of_constraints(model: Model, accelerations: dict[Expr, Expr]) -> list[Close
         friction = model.limited.get(c.name)
         found.append(
             ClosedForm(
-                f"d2/dt2 of {c.name}",
+                RATE + c.name,
                 sp.S.Zero,
                 rate,
                 while_closed=contact,

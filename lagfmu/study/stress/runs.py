@@ -35,7 +35,10 @@ def departing(contact: str, shift: float, bench: Bench) -> Finding:
     for s in bench.facts.starts:
         of = names.read(s.name)
         name = names.name(names.DEPARTURE, contact, of.coordinate, of.order)
-        values[s.name] = float(last[name]) * (1 + shift if of.order else 1)
+        if name in bench.facts.variables:
+            values[s.name] = float(last[name]) * (1 + shift if of.order else 1)
+    if not values:
+        return bench.judged(bench.ordinary, None, "the FMU does not tell where it departed")
     return started(values, bench)
 
 
