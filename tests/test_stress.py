@@ -369,6 +369,15 @@ def test_rounding_in_loops_is_judged_by_what_it_is_made_of(lawful, name, wanted)
         right(one, wanted)
 
 
+def test_an_angle_between_axes_that_are_parallel_is_none(native_fmu):
+    """The arms of a suspension begin 1e-18 rad from where their hinges are drawn: nothing of its motion
+    happens in 1e-16 s."""
+    with Bench(native_fmu("DoubleWishbone"), quick=True) as one:
+        angle = one.ordinary.rows["angle.A"][0]
+        assert 0 < abs(angle) < 1e-15
+        assert one.ordinary_rate < 1e3
+
+
 def test_the_laws_grow_with_the_mechanism():
     """An equation of a chain of 8 is as long as one of 4: what all of them make of its rounding is summed on
     the run (the laws of a suspension took the square of its equations, and 200 s did not do)."""

@@ -147,8 +147,9 @@ class Bench:
         with np.errstate(all="ignore"):
             for q in self.facts.coordinates:
                 place = np.abs(run.rows[q])
-                # of a start that was projected onto 0
-                rounding = ROUNDING * abs(run.values.get(q, 0.0))
+                # of a start that was projected onto 0, and of an angle between axes, which has none
+                angle = self.facts.dimensions[q][-1] == 1
+                rounding = ROUNDING * abs(run.values.get(q, float(angle)))
                 place = np.where(place > rounding, place, 0.0)
                 bare = not any(self.facts.dimensions[q])  # as the parts of a unit quaternion
                 size = np.maximum(place, 1.0 if bare else self.facts.same_unit(q, run.values))
