@@ -105,6 +105,8 @@ def test_the_floor_carries_the_weight_on_the_target_that_the_result_names(asked)
     assert run.target == run[-3:].target == (asked or "native")
     assert repr(run).startswith(f"Resting ({run.target}): ")
     assert f"Resting ({run.target}): " in run._repr_html_()
+    with pytest.raises(ValueError, match=r"no column of Resting; did you mean 'lambda.floor'"):
+        run["lambda.flor"]
 
 
 def test_without_a_compiler_a_weight_is_carried_in_python_and_the_remedy_is_named(

@@ -97,8 +97,8 @@ def test_what_the_importer_sets_stays_and_the_given_values_follow(rod):
 
 @pytest.mark.parametrize("target", ["python", "native"])
 def test_inertia_alone_moves_no_value_that_meets_no_constraint(target: str, built: Built) -> None:
-    """A cart's pendulum is held at another angle than is given: the cart, of which nothing is said and which
-    no constraint holds, stays at 0, however its inertia is coupled to the pendulum's."""
+    """A cart's pendulum is held at another angle than is given: the cart, which no constraint holds, stays
+    where it was, said or not, however its inertia is coupled to the pendulum's."""
     m, L, held = symbols("m L held", positive=True)
     cart = Model(
         name="HeldPendulum",
@@ -108,9 +108,14 @@ def test_inertia_alone_moves_no_value_that_meets_no_constraint(target: str, buil
         parameters=[Parameter(m, 1.0, "kg"), Parameter(L, 0.5, "m"), Parameter(held, 0.3, "rad")],
         start={theta: 0.3},
     )
-    at, _ = begun(built(cart, target=target), held=0.31, theta_dot=2.0)
+    fmu = built(cart, target=target)
+    at, _ = begun(fmu, held=0.31, theta_dot=2.0)
     assert at["theta"] == pytest.approx(0.31, rel=1e-15)
     assert (at["x"], at["der(x)"], at["der(theta)"]) == (0.0, 0.0, 0.0)
+    at, told = begun(fmu, held=0.31, theta=0.32, theta_dot=2.0, x=0.25, x_dot=1.0)
+    assert at["theta"] == pytest.approx(0.31, rel=1e-15)
+    assert (at["x"], at["der(x)"], at["der(theta)"]) == (0.25, 1.0, 0.0)
+    assert [line.split()[2] for line in told] == ["theta", "der(theta)"]
 
 
 def test_velocities_that_are_set_move_the_least_where_all_are(rod):

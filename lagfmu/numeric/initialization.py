@@ -8,9 +8,9 @@ given.  With a stage's coordinates free and the others held, a projection onto G
 
 W (diagonal) makes the priorities of a stage so unlike in mass that of two which could move the lower one
 does, and the higher one least: the limit of least squares with unequal weights (Golub & Van Loan, Matrix
-Computations, sect. 12.1.5).  M couples none of unlike priority: inertia would throw the light one by 1/W.
-Positions by a damped Newton's method (Deuflhard, Newton Methods for Nonlinear
-Problems, sect. 3.1), the step halved until |f| falls; velocities, which are linear, at once.
+Computations, sect. 12.1.5).  M couples none of unlike priority: inertia would throw the light one by 1/W;
+and none that no row holds: these stay.  Positions by a damped Newton's method (Deuflhard, Newton Methods for
+Nonlinear Problems, sect. 3.1), the step halved until |f| falls; velocities, which are linear, at once.
 """
 
 from __future__ import annotations
@@ -62,7 +62,8 @@ class Stage:
         linear.py."""
         free, weight, M, G = self.free, self.weight, M.tocoo(), G.tocoo()
         i, j = M.row, M.col
-        coupled = (i == j) | free[i] & free[j] & (self.of[i] == self.of[j])
+        held = np.isin(np.arange(len(free)), G.col[G.data != 0])
+        coupled = (i == j) | free[i] & free[j] & (self.of[i] == self.of[j]) & (held[i] == held[j])
         mass = M.data * coupled * weight[j] * weight[i]
         M = csr_array((mass, (i, j)), M.shape)
         G = csr_array((G.data * free[G.col], (G.row, G.col)), G.shape)

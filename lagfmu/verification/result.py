@@ -11,6 +11,7 @@ import numpy as np
 
 from .. import names
 from ..errors import SimulationError
+from ..model.rule import missing
 from ..model.units import for_reading
 
 SHOWN = 24  # rows of a table
@@ -52,6 +53,9 @@ class Result(np.ndarray):  # type: ignore[type-arg]
         return f"{self.name} ({self.target}): {len(self)} points"
 
     def __getitem__(self, key: Any) -> Any:
+        columns = self.dtype.names
+        if isinstance(key, str) and columns is not None and key not in columns:
+            raise ValueError(missing(key, columns, f"is no column of {self.name}"))
         found = super().__getitem__(key)
         if isinstance(found, np.ndarray) and found.dtype.names is None:
             return found.view(np.ndarray)

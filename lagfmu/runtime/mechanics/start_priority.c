@@ -5,7 +5,7 @@
  * with the coordinates of a stage free and the others held.  W (diagonal) makes the priorities of a stage so
  * unlike in mass that of two which could move the lower one does, and the higher one least: the limit of
  * least squares with unequal weights (Golub & Van Loan, Matrix Computations, sect. 12.1.5).  M couples none of
- * unlike priority: inertia would throw the light one by 1/W. */
+ * unlike priority: inertia would throw the light one by 1/W; and none that no row holds: these stay. */
 #include "start_priority.h"
 
 #include "thresholds.h"
@@ -47,11 +47,16 @@ Status priority_nearest(Mechanism *b, const Priority *priority, int stage, const
                           const double *c) {
     const System *s = b->system;
     const double ease = b->linear.dense != NULL ? PRIORITY_EASE : LITTLE_EASE;
+    double *held = b->dq;
+    for (int j = 0; j < s->nv; j++) held[j] = 0;
+    for (int e = 0; e < s->entries; e++)
+        if (own[s->entry_row[e]] && b->G[e] != 0) held[s->entry_column[e]] = 1;
     for (int e = 0; e < s->masses; e++) {
         const int i = s->mass_row[e], j = s->mass_column[e];
-        const int held = (int)priority[i] > stage || (int)priority[j] > stage;
-        if (i != j && (held || priority[i] != priority[j])) b->M[e] = 0;
-        if (!held) b->M[e] *= weight(priority[i], stage, ease) * weight(priority[j], stage, ease);
+        const int stays = (int)priority[i] > stage || (int)priority[j] > stage;
+        const int apart = priority[i] != priority[j] || held[i] != held[j];
+        if (i != j && (stays || apart)) b->M[e] = 0;
+        if (!stays) b->M[e] *= weight(priority[i], stage, ease) * weight(priority[j], stage, ease);
     }
     for (int e = 0; e < s->entries; e++)
         if ((int)priority[s->entry_column[e]] > stage) b->G[e] = 0;
