@@ -1,7 +1,7 @@
 """Are the derivatives of a run those that differences of runs show, and what do they cost?
 
     python benchmarks/sensitivities.py [--systems 60] [--runs 10] [--seed 1] [--worst 5]
-    python benchmarks/sensitivities.py --cost [SCENE ...]
+    python benchmarks/sensitivities.py --cost [--instructions] [SCENE ...]
 
 Systems drawn at random (drawn_systems.py: rods, springs, curves, floors with rebound, rough floors), each
 with parameters and start values up to 20 % off, run at a tolerance of 1e-11 with the derivatives of all
@@ -16,23 +16,28 @@ output of that unit by the number), that were flagged, that cannot
 be compared, and, one by one, those that disagree and were not flagged.
 
 --cost: the processor time of a run with 1, 2, 4 and 8 columns in that of a run without, both of which read
-all outputs, and in that of the p + 1 runs of a one-sided difference.
+all outputs, and in that of the p + 1 runs of a one-sided difference.  --instructions: those that valgrind
+counts, in the place of the time.
 """
 
 from __future__ import annotations
 
 import argparse
 import heapq
+import re
 import statistics
+import subprocess
 import tempfile
 import time
 from collections import Counter
 from dataclasses import replace
+from pathlib import Path
 
 import fmpy
 import numpy as np
 from drawn_systems import drawn
 from error_bars import scenes, swing, varied
+from programs import unpacked
 
 from lagfmu import names
 from lagfmu.errors import LagfmuError
@@ -193,37 +198,68 @@ def seconds(session: Session, plan: Plan, runs: int) -> float:
     return time.process_time() - begun
 
 
-def cost(model: Model, scene: Scene, folder: str) -> None:
-    """A line: with p columns, in the time of a run without, and in that of p + 1 of them."""
+COUNT = ["valgrind", "--tool=callgrind", "--callgrind-out-file=/dev/null", "--collect-atstart=no"]
+COUNTED = [f"--toggle-collect=fmi2{name}" for name in ("DoStep", "GetReal")]
+
+
+def instructions(fmu: Path, outputs: list[str], scene: Scene) -> int:
+    """Those of the steps of three runs, and of reading the outputs after each."""
+    ours = unpacked(fmu, fmu.parent)
+    words = ours.command(1e-8, scene.step_size, outputs, step=scene.step_size, stop=scene.stop_time)
+    words[8] = 0  # [s]: three runs
+    told = subprocess.run(
+        [*COUNT, *COUNTED, *map(str, words)], check=True, capture_output=True, text=True
+    )
+    return int(re.search(r"Collected : (\d+)", told.stderr)[1])
+
+
+def ratios(fmus: tuple[Path, Path], outputs: tuple[list[str], list[str]], scene: Scene) -> float:
+    """The median processor time of the second FMU's run in that of the first."""
+    points = int(np.ceil(scene.stop_time / scene.step_size))
+    times = np.arange(points + 1) * scene.step_size
+    sessions = [Session(fmpy.extract(str(fmu))) for fmu in fmus]
+    plans = [Plan((), tuple((n, LAST) for n in keep), times) for keep in outputs]
+    found = []
+    for _ in range(15):
+        plain, more = (seconds(s, plan, 4) for s, plan in zip(sessions, plans, strict=True))
+        found.append(more / plain)
+    for session in sessions:
+        session.close()
+    return statistics.median(found)
+
+
+def has_derivatives(fmu: Path, stop: float) -> bool:
+    """Whether they exist to the end of the run."""
+    session = Session(fmpy.extract(str(fmu)))
+    plan = Plan((), ((names.SENSITIVITY_VALID, LAST),), np.array([0.0, stop]))
+    found = run_batch(session, plan, np.zeros((1, 0))).result[0, 0]
+    session.close()
+    return bool(found)
+
+
+def cost(model: Model, scene: Scene, folder: str, counted: bool) -> None:
+    """A line: with p columns, in the time of a run without, and in that of p + 1 of them; or `counted`."""
     base = replace(scene, method="dop853", methods=("dop853",))
     whole = prepare(model, base)
     by = [v.name for v in whole.table.variables if v.role in ("parameter", "start")]
     of = [v.name for v in whole.table.outputs if v.kind == "Real"]
-    points = int(np.ceil(scene.stop_time / scene.step_size))
-    times = np.arange(points + 1) * scene.step_size
-    plain = Session(fmpy.extract(str(write(whole, f"{folder}/plain", target="native"))))
+    plain = write(whole, f"{folder}/plain", target="native")
     text = f"{scene.name:20s}"
     for count in (1, 2, 4, 8):
         if count > len(by):
             break
         asked = replace(base, sensitivities=(f"*:{','.join(by[:count])}",))
         fmu = write(prepare(model, asked), f"{folder}/{count}", target="native")
-        description = fmpy.read_model_description(str(fmu))
-        more = [v.name for v in description.modelVariables if ".by." in v.name]
-        session = Session(fmpy.extract(str(fmu)))
-        valid = Plan((), ((names.SENSITIVITY_VALID, LAST),), times)
-        if not run_batch(session, valid, np.zeros((1, 0))).result[0, 0]:
+        if not has_derivatives(fmu, scene.stop_time):
             text += f" {count}: no derivatives exist"
-            session.close()
             break
-        plans = [Plan((), tuple((n, LAST) for n in keep), times) for keep in (of, (*of, *more))]
-        ratios = []
-        for _ in range(15):
-            ratios.append(seconds(session, plans[1], 4) / seconds(plain, plans[0], 4))
-        session.close()
-        ratio = statistics.median(ratios)
-        text += f" {count}: {ratio:5.2f} ({ratio / (count + 1):4.2f})"
-    plain.close()
+        description = fmpy.read_model_description(str(fmu))
+        both = [*of, *(v.name for v in description.modelVariables if ".by." in v.name)]
+        if counted:
+            ratio = instructions(fmu, both, scene) / instructions(plain, of, scene)
+        else:
+            ratio = ratios((plain, fmu), (of, both), scene)
+        text += f" {count}: {ratio:5.3f} ({ratio / (count + 1):5.3f})"
     print(text, flush=True)
 
 
@@ -236,13 +272,14 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--worst", type=int, default=5)
     parser.add_argument("--cost", action="store_true")
+    parser.add_argument("--instructions", action="store_true")
     chosen = parser.parse_args()
     if not chosen.cost:
         judge(chosen.systems, chosen.runs, chosen.seed, chosen.worst)
         return
     with tempfile.TemporaryDirectory(prefix="lagfmu_") as folder:
         for model, scene in scenes(list(chosen.scenes or DEFAULT_COST)):
-            cost(model, scene, f"{folder}/{scene.name}")
+            cost(model, scene, f"{folder}/{scene.name}", chosen.instructions)
 
 
 if __name__ == "__main__":

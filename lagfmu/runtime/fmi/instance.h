@@ -31,6 +31,7 @@ typedef struct Instance {
     Solver solver;
     Between between;        /* context: that of tell() */
     Observed seen;          /* what can be read at the state; belongs to it while `observed` is 1 */
+    unsigned long motion;   /* evaluations of the solver when it was observed */
     Sensitivity along;      /* of the full system, where there is an embedding */
     Instant at;             /* of instance_factor() */
     Settings given;         /* solver.* as they were set; tolerance 0: not set */

@@ -17,6 +17,8 @@ Status instance_factor(Instance *x) {
     if (instance_observe_unique(x) != OK) return FAILED;
     *at = segment_instant(s, s->state.now.t);
     segment_begin(s);
+    /* what was observed is the latest motion still, but frictions may have turned */
+    if (s->system->frictions == 0 && x->motion == s->stepped.evaluations + s->full.evaluations) return OK;
     if (segment_motion_near(s, *at, s->state.q, s->state.v) != OK) return FAILED;
     if (full == NULL || full->dynamics == NULL) return OK;
     return mechanism_motion(&s->full, *at, x->seen.q, x->seen.v, s->active_full);

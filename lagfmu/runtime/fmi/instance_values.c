@@ -32,6 +32,7 @@ Status instance_observe(Instance *x) {
     if (instance_start(x) != OK || solver_arrive(&x->solver) != OK || follow(x) != OK) return FAILED;
     if (solver_observe(&x->solver, &x->seen) != OK) return FAILED;
     x->observed = 1;
+    x->motion = x->solver.stepped.evaluations + x->solver.full.evaluations;
     x->evaluated = 0;
     if (DERIVATIVES != NULL) DERIVATIVES->observed(x);
     if (ERROR_BARS != NULL) x->bars->observed = 0;

@@ -68,6 +68,7 @@ static Status check_values(Mechanism *b, Instant at) {
 }
 
 static void evaluate_functions(Mechanism *b, Instant at, const double *q, const double *v) {
+    b->evaluations += 1;
     b->system->dynamics(at.t, q, v, at.u, at.p, b->M, b->F, b->G, b->nu, b->gamma);
     mechanism_kinematics(b, at, q);
 }

@@ -50,6 +50,7 @@ struct Mechanism {
     int *is_unwrapped;              /* (nq) */
     double *angle;                  /* (unwrapped_count) scratch */
     double *vdot, *lambda;          /* of the latest motion(): (nv), (m) */
+    unsigned long evaluations;      /* how many there have been: whether a motion is still the latest */
     double *f;                      /* (m) scratch for residuals */
     double *dq, *trial;             /* (nv), (nq) scratch of project(): what moves, q where it is tried */
     double *reach, *place;          /* (nv) scratch: mechanism_reach() and mechanism_place() of all, or at_work() */

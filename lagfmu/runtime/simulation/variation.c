@@ -32,7 +32,7 @@ static Status rates_along(Solver *s, Instant at, const double *y, const double *
 
 static void variation_rates(Solver *s, double t, const double *y, double *rates) {
     const int n = system_states(s->system);
-    const Instant at = segment_instant(s, t);
+    const Instant at = {t, s->u, s->p}; /* as the motion had them */
     memset(s->sensitivity.du, 0, (size_t)s->system->inputs * sizeof *rates);
     for (int c = 0; c < s->columns && *s->state.varied; c++)
         if (rates_along(s, at, y, y + n * (1 + c), s->column[c].parameter, rates + n * c) != OK) saltation_end(s);
