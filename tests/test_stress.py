@@ -14,8 +14,10 @@ import pytest
 import sympy as sp
 from conftest import MODELS
 from rich.console import Console
+from sympy.physics.mechanics import dynamicsymbols
 from typer.testing import CliRunner
 
+from lagfmu import Model, Nonholonomic, Parameter, Scene
 from lagfmu.testing import (
     CONSISTENT,
     NO_WORRY,
@@ -367,6 +369,37 @@ def test_rounding_in_loops_is_judged_by_what_it_is_made_of(lawful, name, wanted)
     rad/s."""
     with Bench(lawful(name), quick=False) as one:
         right(one, wanted)
+
+
+@pytest.mark.parametrize(
+    ("axes", "sign", "probe"), [("body", 1, "C = 0.25"), ("ground", -1, "at rest")]
+)
+def test_a_body_that_may_not_turn_about_one_axis_is_judged_by_its_speeds(
+    tmp_path, axes, sign, probe
+):
+    """Suslov's body, w_z = 0 to rounding of the other two angular velocities; a ball in angular velocities
+    about the ground's axes, whose equations are none of those that are known here: what is left is held."""
+    q, w = dynamicsymbols("e0:4"), dynamicsymbols("wx wy wz")
+    J = sp.symbols("A B C D E")
+    moments = (1.0, 2.0, 2.5, 0.3, -0.2) if sign == 1 else (1.0, 1.0, 1.0, 0.0, 0.0)
+    across = sp.Matrix(q[1:]).cross(sp.Matrix(w))
+    rates = {q[k + 1]: (q[0] * w[k] + sign * across[k]) / 2 for k in range(3)}
+    model = Model(
+        name=f"Held{axes.capitalize()}",
+        kinetic_energy=sum(a * x**2 for a, x in zip(J, w, strict=False)) / 2
+        + w[2] * (J[3] * w[0] + J[4] * w[1]),
+        coordinates=dict.fromkeys(q, "1"),
+        speeds=dict.fromkeys(w, "rad/s"),
+        kinematics={q[0]: -sum(a * b for a, b in zip(q[1:], w, strict=True)) / 2, **rates},
+        constraints=[Nonholonomic("held", w[2])],
+        parameters=[Parameter(a, b, "kg.m^2") for a, b in zip(J, moments, strict=True)],
+        start={q[0]: 1.0, w[0]: 1.0, w[1]: -2.0},
+    )
+    built = prepare(model, Scene(model.name, stop_time=20.0))
+    path = write(built, tmp_path, (), target="native")
+    lay_beside(path, built)
+    with Bench(path, quick=True) as one:
+        right(one, {probe})
 
 
 def test_an_angle_between_axes_that_are_parallel_is_none(native_fmu):

@@ -192,6 +192,8 @@ def _size(facts: Facts, run: Run, constraint: str) -> Column | None:
             column = peers
         else:
             least = max(least, NOTHING * max(facts.usual(q), float(peers[-1])))
+            if not any(facts.dimensions[q][:-1]):
+                least = max(least, 1.0)  # sines and cosines of angles stand beside 1
         G = np.abs(rows[share] / np.where(acting, lam, 1.0))
         size += np.where(acting, G, G[acting].max()) * np.maximum(
             np.maximum.accumulate(np.abs(column)), least
@@ -200,8 +202,9 @@ def _size(facts: Facts, run: Run, constraint: str) -> Column | None:
 
 
 def _largest_peer(facts: Facts, run: Run, name: str) -> Column:
-    """The largest magnitude so far among the coordinates, or velocities, of the same unit."""
-    moving = [n for n in names.motion(facts.coordinates) if n in facts.dimensions]
+    """The largest magnitude so far among the coordinates, velocities or speeds of the same unit."""
+    speeds = [v.name for v in facts.outputs if names.derivative(v.name) in facts.variables]
+    moving = {*names.motion(facts.coordinates), *speeds} & facts.dimensions.keys()
     same = [n for n in moving if facts.dimensions[n] == facts.dimensions[name]]
     largest = np.maximum.reduce([np.zeros(len(run.rows)), *(np.abs(run.rows[n]) for n in same)])
     return np.asarray(np.maximum.accumulate(largest))

@@ -105,7 +105,9 @@ def _sides(model: Model, variables: frozenset[str]) -> tuple[Any, Any]:
     rates = {q: written_out(sp.sympify(rate)) for q, rate in model.kinematics.items()}
     slope = {q: L.diff(q) for q in rates}
     for four in quaternions(model):
-        turning = angular_velocity(model, four) or ()
+        turning = angular_velocity(model, four)
+        if turning is None:  # of axes that are not the body's
+            continue
         momentum = [L.diff(w) for w in turning]
         for w, spin, bend in zip(turning, momentum, across(turning, momentum), strict=True):
             along = sp.Add(*(slope[q] * rate.diff(w) for q, rate in rates.items() if rate.has(w)))
