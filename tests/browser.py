@@ -44,14 +44,15 @@ def chromium() -> Iterator[Any]:
 
 
 class Page:
-    """One page of a browser, opened from disk with the network off, after a `script` if there is one; keeps
-    what went wrong."""
+    """One page of a browser with the network off, in which a `script` runs first if there is one; keeps what
+    went wrong."""
 
-    def __init__(self, browser: Any, path: Any, script: str = "", **options: Any) -> None:
+    def __init__(self, browser: Any, script: str = "", **options: Any) -> None:
         self.context = browser.new_context(offline=True, **options)
         if script:
             self.context.add_init_script(script)
         self.tab = self.context.new_page()
+        self.size, self.scheme = self.tab.viewport_size, options.get("color_scheme", "light")
         self.tab.set_default_timeout(8000)
         self.problems: list[str] = []
         self.requests: list[str] = []
@@ -65,7 +66,19 @@ class Page:
         )
         self.tab.on("pageerror", lambda error: self.problems.append(str(error)))
         self.tab.on("request", lambda request: self.requests.append(request.url))
+
+    def goto(self, path: Any) -> None:
+        """Opens a file, or an address."""
         self.tab.goto(f"file://{path}" if "://" not in str(path) else str(path))
+
+    def clear(self) -> None:
+        """As it was before it opened anything."""
+        self.tab.goto("about:blank")
+        self.tab.set_viewport_size(self.size)
+        self.tab.emulate_media(media="screen", color_scheme=self.scheme)
+        self.tab.mouse.move(0, 0)
+        self.problems.clear()
+        self.requests.clear()
 
     def run(self, settings: dict[str, Any] | None = None) -> dict[str, Any]:
         """await window.lagfmu.run(settings)"""
@@ -105,6 +118,3 @@ class Page:
         script = "() => axe.run({ rules: { 'target-size': { enabled: true } } })"
         found = self.tab.evaluate(script)["violations"]
         return [f"{v['id']}: {v['nodes'][0]['html'][:200]}" for v in found]
-
-    def close(self) -> None:
-        self.context.close()

@@ -12,7 +12,7 @@ import fmpy
 import numpy as np
 import pytest
 from browser import Page
-from conftest import EVERY, of_each_kind
+from conftest import EVERY, Tab, of_each_kind
 
 from lagfmu.testing import (
     LAST,
@@ -116,13 +116,10 @@ def described(native: Native) -> Run:
 
 
 @pytest.fixture(scope="module")
-def page(name: str, browser: Any, page_file: Any) -> Iterator[Page]:
-    made = Page(browser, page_file(name))
-    made.until("lagfmu.runs")
-    yield made
-    made.close()
-    assert made.problems == []
-    assert all(r.startswith(("file:", "blob:", "data:")) for r in made.requests)
+def page(name: str, tab: Tab, page_file: Any) -> Iterator[Page]:
+    with tab(page_file(name)) as made:
+        made.until("lagfmu.runs")
+        yield made
 
 
 def test_the_module_is_the_native_fmu(

@@ -7,19 +7,17 @@ import re
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from browser import Page
-from conftest import MODELS
+from conftest import MODELS, Opened
 from typer.testing import CliRunner
 
 from lagfmu.testing import Playable, app, render, wasm
 from lagfmu.testing import playable as playable_of
 
 
-def test_a_script_runs_the_page_or_is_told_why_not(opened: Callable[..., Page]) -> None:
+def test_a_script_runs_the_page_or_is_told_why_not(opened: Opened) -> None:
     """cos(theta) = (2/3) cos(theta0) at the departure, for the start that it asks for; a mass of zero is
     refused in the FMU's words, and names that it does not have, all at once."""
     page = opened("Hemisphere")
@@ -35,7 +33,7 @@ def test_a_script_runs_the_page_or_is_told_why_not(opened: Callable[..., Page]) 
 
 
 def test_what_an_fmu_says_is_text(
-    native_fmu: Callable[[str], Path], tmp_path: Path, browser: Any
+    native_fmu: Callable[[str], Path], tmp_path: Path, opened: Opened
 ) -> None:
     """A description with markup in it is shown as it is written, and runs nothing."""
     evil = "<img src=x onerror=alert(1)></script><script>document.title='taken'</script>"
@@ -53,13 +51,11 @@ def test_what_an_fmu_says_is_text(
             new.writestr(name, text)
     out = tmp_path / "evil.html"
     out.write_text(render(playable_of(path)), encoding="utf-8")
-    page = Page(browser, out)
+    page = opened(out)
     assert page.run()["time"][-1] == 2.0
     assert page.tab.title().startswith("Hemisphere")
     assert page.tab.locator(".lead").inner_text().startswith(evil)
     assert page.tab.locator("main img, main script").count() == 0
-    page.close()
-    assert page.problems == []
 
 
 def test_a_python_fmu_has_no_sources_to_compile(
@@ -133,7 +129,7 @@ def test_a_page_is_the_same_from_model_and_fmu(
 
 @pytest.mark.parametrize("target", ["native", pytest.param("python", marks=pytest.mark.thorough)])
 def test_the_page_travels_in_the_fmu(
-    target: str, tmp_path: Path, browser: Any, request: pytest.FixtureRequest
+    target: str, tmp_path: Path, opened: Opened, request: pytest.FixtureRequest
 ) -> None:
     """lagfmu build --page: the page lies beside the documentation, which has a link to it, and the FMU
     grows by 250 kB at most; without the option it is as it was (but for the icon, which the FMUs that tests
@@ -156,7 +152,5 @@ def test_the_page_travels_in_the_fmu(
     assert contents[0] == contents[1]
     path = tmp_path / "play.html"
     path.write_bytes(live)
-    page = Page(browser, path)
+    page = opened(path)
     assert page.run()["time"][-1] == 2.0
-    page.close()
-    assert page.problems == []

@@ -5,6 +5,8 @@ from __future__ import annotations
 import csv
 import json
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from functools import cache
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -12,10 +14,10 @@ from urllib.parse import quote
 import numpy as np
 import pytest
 from browser import Page
+from conftest import Opened, Tab
 
 from lagfmu import simulate
 
-Opened = Callable[..., Page]
 Fmu = Callable[[str], Path]
 REACHED = """[...document.querySelectorAll("input, select, button, summary, [tabindex]")]
     .filter((e) => e.checkVisibility())"""
@@ -46,20 +48,17 @@ def go_to_end(page: Page) -> None:
 
 
 @pytest.fixture(scope="module")
-def seen(browser: Any, page_file: Any) -> Iterator[Callable[[str], Page]]:
+def seen(tab: Tab, page_file: Any) -> Iterator[Callable[[str], Page]]:
     """seen(NAME): its page with its first run, opened once for all who only look."""
-    pages: dict[str, Page] = {}
+    with ExitStack() as stack:
 
-    def get(name: str) -> Page:
-        if name not in pages:
-            pages[name] = Page(browser, page_file(name))
-            pages[name].until("lagfmu.runs")
-        return pages[name]
+        @cache
+        def get(name: str) -> Page:
+            page = stack.enter_context(tab(page_file(name)))
+            page.until("lagfmu.runs")
+            return page
 
-    yield get
-    for page in pages.values():
-        page.close()
-        assert page.problems == []
+        yield get
 
 
 def events_of(page: Page) -> dict[str, tuple[float, str]]:
@@ -209,24 +208,21 @@ def test_a_refused_value_is_told_and_the_curves_stay(opened: Opened) -> None:
     page.until(f"{status}.startsWith('Run to 2 s')")
 
 
-def test_a_link_brings_the_settings(opened: Opened, page_file: Any, browser: Any) -> None:
+def test_a_link_brings_the_settings(opened: Opened, page_file: Any) -> None:
     """Opened by its link, the page is as it was left."""
     page = opened("Hemisphere")
     page.slide("theta", 0.3)
     page.tab.locator("#link").click()
     address = page.tab.locator("#link-text").input_value()
-    other = Page(browser, address)
+    other = opened(address)
     other.until("lagfmu.runs")
     go_to_end(other)
     end = value(other, "departure.surface.theta")
     assert np.cos(end) == pytest.approx(2 * np.cos(0.3) / 3, rel=1e-7)
-    other.close()
-    assert other.problems == []
     wrong = quote(json.dumps({"values": {"<b>q</b>": 1}}))
-    other = Page(browser, f"file://{page_file('Hemisphere')}#{wrong}")
+    other = opened(f"file://{page_file('Hemisphere')}#{wrong}")
     other.until("lagfmu.runs")
     assert "<b>q</b>" in other.tab.locator("#link-problem").inner_text()
-    other.close()
 
 
 def test_a_slider_has_the_bounds_and_the_unit_of_its_variable(opened: Opened) -> None:

@@ -7,13 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from browser import Page
-from conftest import of_each_kind
+from conftest import Opened, of_each_kind
 
 from lagfmu.testing import Prepared, with_figures
 from lagfmu.testing import documentation_page as documentation
 
-Opened = Callable[..., Page]
 PHONE = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True}
 LYING = {**PHONE, "viewport": {"width": 844, "height": 390}}
 SLID = ("Hemisphere", "SliderCrank", "Gyroscope")
@@ -194,13 +192,12 @@ def test_nothing_of_a_page_keeps_a_reader_out(
 
 @pytest.mark.parametrize("theme", of_each_kind(["light", "dark"], kinds=("dark",)))
 def test_nothing_of_the_documentation_keeps_a_reader_out(
-    theme: str, prepared: Callable[[str], Prepared], browser: Any, tmp_path: Path
+    theme: str, prepared: Callable[[str], Prepared], opened: Opened, tmp_path: Path
 ) -> None:
     """axe-core finds nothing in the page of an FMU with contacts, frictions and its verification, on a phone:
     wide tables scroll by keys."""
     path = tmp_path / "index.html"
     figures = [("energy", "1e-9", "1e-8", "21", "pass"), ("force", "1", "1e-8", "21", "FAIL")]
     path.write_text(with_figures(documentation(prepared("Belt")), figures), encoding="utf-8")
-    page = Page(browser, path, viewport={"width": 390, "height": 844}, color_scheme=theme)
+    page = opened(path, viewport={"width": 390, "height": 844}, color_scheme=theme)
     assert page.violations() == []
-    page.close()

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from browser import Page
+from conftest import Opened, Tab
 
 Drawn = dict[str, Any]
 TO = """(part) => {
@@ -52,16 +53,13 @@ PINCH = """() => {
 
 
 @pytest.fixture(scope="module")
-def page(browser: Any, page_file: Callable[[str], Path]) -> Iterator[Page]:
+def page(tab: Tab, page_file: Callable[[str], Path]) -> Iterator[Page]:
     """That of a door on two hinges; a test that moves the view sets it back."""
-    made = Page(browser, page_file("Door"), viewport={"width": 1280, "height": 844})
-    made.until("lagfmu.runs && lagfmu.view")
-    if made.tab.evaluate("lagfmu.view") != "space":
-        pytest.skip("this browser has no WebGL")
-    yield made
-    made.close()
-    assert made.problems == []
-    assert all(r.startswith(("file:", "blob:", "data:")) for r in made.requests)
+    with tab(page_file("Door"), viewport={"width": 1280, "height": 844}) as made:
+        made.until("lagfmu.runs && lagfmu.view")
+        if made.tab.evaluate("lagfmu.view") != "space":
+            pytest.skip("this browser has no WebGL")
+        yield made
 
 
 def shapes(page: Page, kind: str) -> list[Any]:
@@ -167,7 +165,7 @@ def test_the_view_is_moved_and_set_back(page: Page, move: str) -> None:
     page.until(f"document.getElementById('space').toDataURL() === {before!r}")
 
 
-def test_what_is_lost_is_drawn_flat(opened: Callable[..., Page]) -> None:
+def test_what_is_lost_is_drawn_flat(opened: Opened) -> None:
     """Where the graphics card takes WebGL away, the flat projection stands in, and the page says so."""
     page = opened("Gyroscope")
     page.until("lagfmu.runs && lagfmu.view === 'space'")
@@ -192,7 +190,7 @@ def test_of_three_js_is_there_what_is_used() -> None:
     assert all(f"{name}:()=>" in library for name in used)
 
 
-def test_paper_shows_the_picture_in_light_colours(opened: Callable[..., Page]) -> None:
+def test_paper_shows_the_picture_in_light_colours(opened: Opened) -> None:
     """Who reads in the dark prints what others print, without the controls of the view."""
     shown = []
     for scheme in ("light", "dark"):

@@ -9,7 +9,7 @@ import zlib
 
 import numpy as np
 import pytest
-from browser import Page, program
+from browser import program
 from conftest import MODELS
 from lxml import html
 from typer.testing import CliRunner
@@ -215,15 +215,13 @@ def test_a_pdf_is_printed_by_firefox_where_there_is_no_chromium(native_fmu, tmp_
         report_pdf.printed("<p>nothing", "h.pdf")
 
 
-def test_the_page_fits_a_telephone(hemisphere, browser):
+def test_the_page_fits_a_telephone(hemisphere, opened):
     """At 390 and 1280 pixels nothing but tables and formulas is wider than the window, and axe-core finds
     no fault."""
     for width in (390, 1280):
-        tab = Page(browser, hemisphere, viewport={"width": width, "height": 800})
-        assert tab.tab.evaluate("document.documentElement.scrollWidth") <= width
-        assert tab.violations() == []
-        assert tab.problems == []
-        tab.close()
+        page = opened(hemisphere, viewport={"width": width, "height": 800})
+        assert page.tab.evaluate("document.documentElement.scrollWidth") <= width
+        assert page.violations() == []
 
 
 def test_a_model_gives_the_same_bytes_twice(tmp_path):

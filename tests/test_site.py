@@ -7,10 +7,9 @@ import os
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import pytest
-from browser import Page
+from conftest import Opened
 from once import once
 from PIL import Image
 
@@ -74,14 +73,13 @@ SHOWN = """() => [...document.querySelectorAll("picture img")].map((e) => [
     [("", ["hemisphere"]), ("mechanics/", ["hoop"]), ("gallery/", ["hemisphere", "hoop"])],
 )
 def test_mechanisms_move_unless_the_reader_wants_none(
-    wish: str, name: str, files: list[str], site: Path, browser: Any
+    wish: str, name: str, files: list[str], site: Path, opened: Opened
 ) -> None:
     """The first page, the lecturer's and each model of the gallery have a film of many frames, which opens
     the live page; who asks for less motion has one picture in its place."""
-    page = Page(browser, site / name / "index.html", reduced_motion=wish)
+    page = opened(site / name / "index.html", reduced_motion=wish)
     page.until("[...document.querySelectorAll('picture img')].every((e) => e.complete)")
     shown = page.tab.evaluate(SHOWN)
-    page.close()
     assert [Path(file).stem for file, *_ in shown] == files
     assert len(shown) == len(files)
     for file, drawn, target in shown:
@@ -98,15 +96,13 @@ def test_mechanisms_move_unless_the_reader_wants_none(
 )
 @pytest.mark.parametrize("theme", ["light", "dark"])
 def test_nothing_of_the_site_keeps_a_reader_out(
-    name: str, theme: str, site: Path, browser: Any
+    name: str, theme: str, site: Path, opened: Opened
 ) -> None:
     """axe-core finds nothing: contrast, headings, heads of tables, links told by more than colour."""
-    page = Page(
-        browser,
+    page = opened(
         site / name / "index.html",
         color_scheme=theme,
         viewport={"width": 800, "height": 900},
     )
     page.until("document.querySelector('[data-md-component=container]')")
     assert page.violations() == []
-    page.close()
