@@ -30,6 +30,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy: the processe
 
 import fmi3
 import pytest
+import typer.testing
 from browser import Page, chromium
 from fmi2 import Library
 from once import once
@@ -49,6 +50,7 @@ from lagfmu.testing import (
 from lagfmu.testing import playable as playable_of
 
 gc.set_threshold(100_000, 20, 20)  # as the command has it
+typer.testing._get_command = cache(typer.testing._get_command)  # put together once a process
 
 MODELS = Path(__file__).parent.parent / "models"
 FILES = {

@@ -196,16 +196,16 @@ def test_simulate_takes_a_model_file_too(small, tmp_path):
     assert "Link, LinkMinimal" in text
 
 
-def test_figures_that_cannot_be_made_are_one_message(small, tmp_path):
+def test_figures_that_cannot_be_made_are_one_message(native_fmu, tmp_path):
     """An unknown variable, an unknown format, a place that cannot be written."""
     (tmp_path / "file").write_text("")
     for code, options, parts in (
-        (2, ("--plot", tmp_path / "a.svg", "-v", "lambda.rod"), ("lambda.rod", "lambda.link")),
+        (2, ("--plot", tmp_path / "a.svg", "-v", "lambda.rod"), ("lambda.rod", "lambda.surface")),
         (2, ("--plot", tmp_path / "a.doc"), ("a.doc",)),
         (3, ("--plot", tmp_path / "file" / "a.svg"), ("a.svg",)),
         (3, ("--csv", tmp_path / "file" / "a.csv"), ("a.csv",)),
     ):
-        text = lagfmu("simulate", small, *options, code=code)
+        text = lagfmu("simulate", native_fmu("Hemisphere"), *options, code=code)
         assert "error:" in text
         for part in parts:
             assert part in text

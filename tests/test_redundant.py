@@ -72,11 +72,8 @@ def compare(fmus: Pair, method: str, tolerance: float) -> None:
 def test_redundant_constraints_cost_no_steps(name, pair):
     """Stages lie off the constraints, where rows that depend on each other ask for different accelerations:
     as many as are independent on the constraints say what acts."""
-    for tolerance in (1e-6, 1e-9, 1e-12):
-        compare(pair(name), "dop853", tolerance)
-    for tolerance in (1e-6, 1e-9):
-        compare(pair(name), "radau5", tolerance)
-    compare(pair(name), "rk4", 1e-6)
+    for method, tolerance in (("dop853", 1e-6), ("dop853", 1e-12), ("radau5", 1e-9), ("rk4", 1e-6)):
+        compare(pair(name), method, tolerance)
 
 
 def test_an_instance_that_has_not_begun_goes_on_by_the_rows_of_a_saved_state(pair):

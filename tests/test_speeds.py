@@ -241,7 +241,7 @@ def test_joints_of_a_kind_share_their_code() -> None:
     reports the multipliers of the python one, whose equations are written out; a further rod costs places in
     tables and what is its own, always as much."""
     three = prepare(chain(3))
-    runs = [simulate(three, target=t, stop_time=0.5, tolerance=1e-10) for t in TARGETS]
+    runs = [simulate(three, target=t, stop_time=0.2, tolerance=1e-10) for t in TARGETS]
     for name in ("lambda.A0.y", "lambda.A2.x", "lambda.A1.b", "wz2", "Q.wx1"):
         size = np.abs(runs[0][name]).max()
         np.testing.assert_allclose(runs[1][name], runs[0][name], rtol=0, atol=1e-8 * max(size, 1.0))
