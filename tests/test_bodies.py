@@ -482,6 +482,40 @@ def test_a_mechanism_is_assembled_from_the_joint_coordinates_that_are_given():
     assert sin(elbow["angle.C"]) == pytest.approx(-sin(first["angle.C"]), rel=1e-12)
 
 
+def test_a_trolley_above_its_load_rolls_aside_and_turns_nothing():
+    """A load that is put half a rope of 1 m below its trolley: the trolley rolls by sqrt(3)/2 m, either way,
+    and a warning tells the other.  Nothing turns the load (it was by -0.5 rad, without a word)."""
+    trolley, load = Body("trolley", 10.0, 1.0), Body("load", 1.0, 0.01)
+    rope = Distance("rope", trolley.at((0, 0)), load.at((0, 0)), length=1.0)
+    rail = Prismatic("rail", ground.at((0, 0)), trolley.at((0, 0)), axis="x")
+    given = {"load.position": (0.0, -0.5)}
+    with pytest.warns(UserWarning, match="the joints close in two ways") as told:
+        model = plane(bodies=[trolley, load], joints=[rail, rope], start=given)
+    start = {str(q): x for q, x in model.start.items()}
+    aside = start["trolley.position.x(t)"]
+    assert abs(aside) == pytest.approx(sqrt(3) / 2, rel=1e-9)
+    assert start["load.orientation.z(t)"] == pytest.approx(0, abs=1e-9)
+    other = re.search(r"for the other start 'position\.rail' at (\S+)$", str(told[0].message))
+    assert float(other[1]) == pytest.approx(-aside, rel=1e-9)
+
+
+def test_a_parallelogram_that_is_folded_flat_keeps_the_angle_that_is_given():
+    """Crank at 0, and so all links on one line: what is omitted finds the way there (the crank was moved to
+    -3.4 rad, for it "cannot be closed there")."""
+    parts = [Body(n, 1.0, 0.01) for n in ("crank", "coupler", "rocker")]
+    (a1, a2), (b1, b2), (c1, c2) = (
+        (b.at((-x / 2, 0)), b.at((x / 2, 0))) for b, x in zip(parts, (0.2, 0.5, 0.2), strict=True)
+    )
+    pairs = ((ground.at((0, 0)), a1), (a2, b1), (b2, c1), (c2, ground.at((0.5, 0))))
+    joints = [Revolute(n, *ends) for n, ends in zip("ABCD", pairs, strict=True)]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        model = plane(bodies=parts, joints=joints, start={"angle.A": 0.0})
+    start = {str(q): x for q, x in model.start.items()}
+    assert start["crank.orientation.z(t)"] == pytest.approx(0, abs=1e-9)
+    assert cos(start["rocker.orientation.z(t)"]) == pytest.approx(-1, abs=1e-6)
+
+
 @pytest.mark.parametrize("target", ["native", "python"])
 def test_another_length_moves_what_was_only_assembled(target):
     """With a longer rod and another crank the given angle and its rate stay; the piston is where the triangle

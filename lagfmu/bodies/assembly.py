@@ -23,7 +23,7 @@ from ..errors import LagfmuWarning, ModelError
 from ..model.elements import Contact, Expr, Holonomic, Nonholonomic
 from ..model.model import Model
 from ..names import derivative
-from .branches import CLOSED, has_loop, tell_second_branch
+from .branches import CLOSED, has_loop, is_small, other_angles, tell_second_branch
 from .draft import Draft
 from .given import Beginning, given_values, known_names
 from .guess import guessed
@@ -67,23 +67,38 @@ def assemble(
     if problems := list(_parallel([c.name for c in closing], f.values(rough))):
         raise ModelError(model.name, problems)
     size = moving.sized(rough)
-    q, missed = moving.closed([f, held], wanted, rough)
+    measures = {n: of.values[0] for n, of in draft.relative.items() if n not in places}
+
+    def from_other_angles() -> Iterator[tuple[Array, Array]]:
+        for angles in other_angles(measures):
+            put = guessed(draft, model, parts, {**angles, **places})
+            yield moving.newton([f, held], wanted, moving.tied(put, places), CLOSED)
+
+    q, missed = moving.newton([f, held], wanted, rough)
+    at_once = missed.max(initial=0.0) <= CLOSED
+    if not at_once:
+        q, missed = moving.closed([f, held], wanted, rough)
     if missed.max(initial=0.0) > CLOSED:
-        q, missed = moving.closed([f], np.zeros(len(closing)), q)
+        q, missed = min(from_other_angles(), key=lambda found: float(found[1].max(initial=0.0)))
+    if missed.max(initial=0.0) > CLOSED:
+        begun, asked = (q, rough), np.array([*places.values()])
+        tried = [moving.closed([f], np.zeros(len(closing)), start) for start in begun]
+        closed = [t for t in tried if t[1].max(initial=0.0) <= CLOSED] or tried
+        q, missed = min(closed, key=lambda t: float(np.linalg.norm(held.values(t[0]) - asked)))
     if missed.max(initial=0.0) > CLOSED:
         motors = {name for name, line in model.parts if line.startswith("motor")}
         missing = _open([c.name for c in closing], f.values(q), missed, motors)
         raise ModelError(model.name, list(missing))
     _tell(model, places, held.values(q), size)
     _tell_beyond_limits(model, draft, parts, q)
-    if has_loop(draft, parts) and moving.is_determined([f, held], q):
-        measures = {n: of.values[0] for n, of in draft.relative.items() if n not in places}
-
-        def closed_from(angles: Mapping[str, float]) -> tuple[Array, Array]:
-            put = guessed(draft, model, parts, {**angles, **places})
-            return moving.newton([f, held], wanted, moving.tied(put, places), CLOSED)
-
-        tell_second_branch(model, measures, closed_from, rough, q)
+    if is_small(draft) and (has_loop(draft, parts) or not at_once):
+        told = {
+            n: e
+            for n, e in measures.items()
+            if moving.determines([f, held], q, Rows(model, [draft.relative[n].values[:2]]))
+        }
+        others = from_other_angles() if at_once else moving.closed_about([f, held], wanted, rough)
+        tell_second_branch(model, told, others, rough, q)
 
     still = [f, Rows(model, [condition(model, c) for c in rolling])]
     driven = Rows(model, [known[n][:2] for n in rates])

@@ -1,14 +1,15 @@
 """A second way in which the joints of a loop close: an elbow up, or down.
 
-It is looked for from other angles of the joints, drawn at random, where nothing is left to move: where a
-motion is left, it may lead from one branch to the other.
+It is looked for from other angles of the joints, drawn at random, and about a beginning from which no step
+leads anywhere, as where all links lie on a line.  What a motion that is left may change tells no branches
+apart: it may lead from one to the other.
 """
 
 from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -31,32 +32,41 @@ class SecondBranchWarning(LagfmuWarning):
 
 
 def has_loop(draft: Draft, parts: Sequence[Any]) -> bool:
-    """True if there are more ties than bodies, and not too many of them."""
+    """True if there are more ties than bodies."""
     ties = sum(hasattr(part, "relative_pose") for part in parts)
-    bodies = len(draft.motions) - 1
-    return ties > bodies and 6 * bodies <= MOST
+    return ties > len(draft.motions) - 1
+
+
+def is_small(draft: Draft) -> bool:
+    """True if there are not too many bodies to look for other branches."""
+    return 6 * (len(draft.motions) - 1) <= MOST
+
+
+def other_angles(measures: Iterable[str]) -> Iterator[dict[str, float]]:
+    """Angles of joints, drawn at random, to begin from."""
+    draws, names = np.random.default_rng(0), [n for n in measures if n.startswith("angle")]
+    for _ in range(DRAWS):
+        yield {n: draws.uniform(-math.pi, math.pi) for n in names}
 
 
 def tell_second_branch(
     model: Model,
     measures: Mapping[str, Expr],
-    closed_from: Callable[[Mapping[str, float]], tuple[Array, Array]],
+    closed: Iterable[tuple[Array, Array]],
     rough: Array,
     q: Array,
 ) -> None:
     """Warns of a branch besides q that is about as near to the rough place, by the angle or position (of
-    `measures`, which are free) that tells them apart most.  `closed_from` closes the joints from other
-    angles: coordinates, and what each row then misses."""
+    `measures`, which are not given) that tells them apart most.  `closed` are places found from elsewhere:
+    coordinates, and what each row then misses."""
     if not measures:
         return
     rows = Rows(model, [(e, sp.S.Zero) for e in measures.values()])
     stops = [c.expression for c in model.constraints if isinstance(c, Contact)]
     gaps = Rows(model, [(e, sp.S.Zero) for e in stops])
-    draws, way = np.random.default_rng(0), float(np.linalg.norm(q - rough))
+    way = float(np.linalg.norm(q - rough))
     here, nearest, apart = rows.values(q), NEAR * way, None
-    for _ in range(DRAWS):
-        angles = {n: draws.uniform(-math.pi, math.pi) for n in measures if n.startswith("angle")}
-        there, missed = closed_from(angles)
+    for there, missed in closed:
         far = float(np.linalg.norm(there - rough))
         difference = _turned(measures, rows.values(there) - here)
         another = np.abs(difference).max() > ANOTHER * way

@@ -7,7 +7,7 @@ Newton's method, damped by halving,
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -22,8 +22,13 @@ from .branches import CLOSED
 from .draft import Draft
 from .rows import TIME, Array, Rows, numbers_of
 
-STEPS, HALVINGS = 100, 12
-TRIES = 12  # beginnings with other omitted values, where the first leads nowhere
+STEPS, HALVINGS, RETURNS = 100, 12, 20
+TRIES, FEW = (
+    12,
+    4,
+)  # beginnings with other omitted values, where the first leads nowhere; that close
+STILL = 1e-6  # relative: rows that close to CLOSED leave such a motion
+LEAST = 1e-6  # of the way back: a gain that is none
 LIGHT = 1e-6  # what resists a parameter of a curve, which has no mass, of that of the body
 REDUNDANT = 1e-11  # a singular value, relative to the largest: rows that say the same
 DENSE = 200  # speeds up to which dense algebra is as quick
@@ -82,23 +87,65 @@ class Moving:
         """Coordinates at which the rows have the wanted values, and what each misses, relative to its size.
 
         A beginning from which Newton's method comes to rest elsewhere, as where all links lie on a line, is
-        left for others about it.
+        left for others about it: of these the one that leads nearest to it.
         """
-        draws = np.random.default_rng(0)
-        best, least = rough, np.full(len(wanted), np.inf)
-        for k in range(TRIES):
-            away = draws.uniform(-0.5, 0.5, len(self.scale)) * self.scale
-            q, missed = self.newton(rows, wanted, self.moved(rough, away) if k else rough)
-            if missed.max(initial=0.0) < least.max(initial=0.0):
-                best, least = q, missed
-            if least.max(initial=0.0) <= CLOSED:
-                break
-        return best, least
+        q, missed = self.newton(rows, wanted, rough)
+        if missed.max(initial=0.0) <= CLOSED:
+            return q, missed
+        found = [(q, missed), *self.closed_about(rows, wanted, rough)]
+        there = [f for f in found if f[1].max() <= CLOSED]
+        if there:
+            return min(there, key=lambda f: self._far(f[0], rough))
+        return min(found, key=lambda f: float(f[1].max()))
 
-    def is_determined(self, rows: Sequence[Rows], q: Array) -> bool:
-        """True if the rows leave no motion."""
-        slopes = np.vstack([r.slopes(q) for r in rows]) / self.weight
-        return bool(np.linalg.matrix_rank(slopes) == len(self.weight))
+    def closed_about(
+        self, rows: Sequence[Rows], wanted: Array, rough: Array
+    ) -> Iterator[tuple[Array, Array]]:
+        """The same from other beginnings, drawn at random, each led back to the rough one as far as the rows
+        allow; not more than FEW that close."""
+        draws, few = np.random.default_rng(0), 0
+        for _ in range(TRIES):
+            away = draws.uniform(-0.5, 0.5, len(self.scale)) * self.scale
+            q, missed = self.newton(rows, wanted, self.moved(rough, away))
+            if missed.max() <= CLOSED:
+                q, missed = self._back(rows, wanted, rough, q, missed)
+                few += 1
+            yield q, missed
+            if few == FEW:
+                return
+
+    def _back(
+        self, rows: Sequence[Rows], wanted: Array, rough: Array, q: Array, missed: Array
+    ) -> tuple[Array, Array]:
+        """From q on along the rows to where the movement from the rough place is least."""
+        for _ in range(RETURNS):
+            way = self._way(q, rough)
+            A = self._slopes(rows, q)
+            along = way + self._least(A, -(A @ way), self._sizes(A))
+            new, left = self.newton(rows, wanted, self.moved(q, along))
+            if left.max() > CLOSED or self._far(new, rough) > (1 - LEAST) * self._far(q, rough):
+                break
+            q, missed = new, left
+        return q, missed
+
+    def _way(self, q: Array, to: Array) -> Array:
+        """The movement d that leads from q to another place, as far as a movement is linear."""
+        to = to.copy()
+        for place in self._quaternions:
+            to[place] *= 1 if q[place] @ to[place] >= 0 else -1
+        B = self._slopes([self._moved], q)
+        d: Array = np.linalg.lstsq(np.asarray(B @ np.eye(B.shape[1])), to - q, rcond=None)[0]
+        return d
+
+    def _far(self, q: Array, rough: Array) -> float:
+        """How far a place is, in the metric of M."""
+        return float(np.linalg.norm(self.weight * self._way(q, rough)))
+
+    def determines(self, rows: Sequence[Rows], q: Array, measure: Rows) -> bool:
+        """True if no motion that the rows leave changes the measure."""
+        held, wanted = (self._slopes(r, q) / self.weight for r in (rows, [measure]))
+        made = np.linalg.lstsq(held.T, wanted.T, rcond=STILL)[0]
+        return bool(np.linalg.norm(wanted - made.T @ held) <= STILL * np.linalg.norm(wanted))
 
     def newton(
         self, rows: Sequence[Rows], wanted: Array, q: Array, enough: float = 0.0
