@@ -3,9 +3,11 @@
     python benchmarks/chain.py [masses|bodies] [n ...]
 
 masses: L is a sum of local terms, M and G are sparse.  bodies: a chain in space whose hinges turn about x and
-y by turns; bodies and joints are of a few kinds, instantiated and not derived anew.  Both should cost O(n).
+y by turns; bodies and joints are of a few kinds, instantiated and not derived anew.  It hangs, and gravity
+pulls aside.  Both should cost O(n).
 Prints for each n the processor time [s] of each stage, of masses the median of three runs, and the growth
-exponent between neighbours.
+exponent between neighbours; of bodies also what the library does (loading, initializing, a step: the least
+of a few times), and how large it, its description and the memory of an instance are.
 """
 
 from __future__ import annotations
@@ -14,25 +16,37 @@ import math
 import os
 import statistics
 import sys
+import tempfile
+import time
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+from unittest import mock
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command does
 
+from fmpy import calloc
 from sympy import symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Holonomic, Model, Parameter, Scene, derive
 from lagfmu.bodies import Body, Gravity, Ground, Revolute, mechanism
 from lagfmu.codegen.py.equations import source
+from lagfmu.fmu.binary import instantiated
 from lagfmu.fmu.compiler import chosen
+from lagfmu.fmu.face import USUAL
 from lagfmu.fmu.native import sources_of
+from lagfmu.fmu.read import read_description
+from lagfmu.fmu.trial import lay_out
 from lagfmu.mechanics.form import Form
 from lagfmu.prepare import prepare as steps
 from lagfmu.prepare.steps import Request
 
 RUNS = 3
-Stages = Iterator[str]
+TRIES = 5
+STEP = 1e-4  # s, of which each is one step of the integrator's
+Stages = Iterator[str | tuple[str, float]]
 
 
 def chain(n: int) -> Model:
@@ -64,7 +78,7 @@ def bodies(n: int) -> Model:
         hinges.append(Revolute(f"J{k}", last, link.at((0, 0, 0.5)), axis="xy"[k % 2]))
         last = link.at((0, 0, -0.5))
     start = {f"b{k}.position": (0, 0, -0.5 - k) for k in range(n)}
-    loads = [Gravity((0, 0, -9.81))]
+    loads = [Gravity((2, 3, -9.0))]
     return mechanism(f"Bodies{n}", bodies=links, joints=hinges, loads=loads, start=start)
 
 
@@ -79,7 +93,8 @@ def of_masses(n: int) -> Stages:
 
 
 def of_bodies(n: int) -> Stages:
-    """The model with its assembly, equations, variables and Python, start and rank, C, the library."""
+    """The model with its assembly, equations, variables and Python, start and rank, C, the library; what
+    fmpy takes to read the description; see `of_library`."""
     model = bodies(n)
     yield "model"
     scene = Scene(model.name, stop_time=1.0, step_size=0.1)
@@ -91,43 +106,84 @@ def of_bodies(n: int) -> Stages:
     yield "start"
     made = sources_of(prepared)
     yield "generate"
-    made.compiled(model.name, chosen(["host"]))
+    (host,) = chosen(["host"])
+    library = made.compiled(model.name, [host])[host.folder]
     yield "compile"
+    with tempfile.TemporaryDirectory() as folder:
+        place = f"{USUAL.binaries(host)}/{model.name}{host.suffix}"
+        lay_out(Path(folder), made.description, library, place)
+        described = read_description(Path(folder))
+        yield "read"
+        yield from of_library(Path(folder), described)
+    yield "library kB", len(library) / 1e3
+    yield "xml kB", len(made.description) / 1e3
+
+
+def of_library(folder: Path, described: Any) -> Stages:
+    """To load it and make an instance, to initialize that, a step: the least processor time [s]; and what
+    memory an instance asks for."""
+    taken: dict[str, list[float]] = {"load": [], "initialize": [], "step": []}
+    sizes: list[int] = []
+
+    def counted(count: int, size: int) -> Any:
+        sizes.append(count * size)
+        return calloc(count, size)
+
+    for _ in range(TRIES):
+        times = [time.process_time()]
+        with mock.patch("fmpy.calloc", counted):
+            instance = instantiated(folder, described, "chain", False)
+        times.append(time.process_time())
+        instance.setupExperiment(startTime=0.0)
+        instance.enterInitializationMode()
+        instance.exitInitializationMode()
+        times.append(time.process_time())
+        for k in range(TRIES):
+            instance.doStep(k * STEP, STEP)
+        times.append(time.process_time())
+        for name, a, b in zip(taken, times, times[1:], strict=False):
+            taken[name].append(b - a)
+        instance.freeInstance()
+    taken["step"] = [t / TRIES for t in taken["step"]]
+    yield from ((name, min(times)) for name, times in taken.items())
+    yield "memory kB", sum(sizes) / TRIES / 1e3
+
+
+def processor() -> float:
+    """Processor time [s] of this process and of those that it waited for."""
+    times = os.times()
+    return time.process_time() + times.children_user + times.children_system
 
 
 def measured(stages: Callable[[int], Stages], n: int) -> dict[str, float]:
-    """Processor time [s] of each stage, that of compilers included."""
-    found, before = {}, sum(os.times()[:4])
-    for name in stages(n):
-        now = sum(os.times()[:4])
-        found[name], before = now - before, now
+    """Of each stage the processor time [s], that of compilers included, or what it says itself."""
+    found, before = {}, processor()
+    for stage in stages(n):
+        name, own = (stage, None) if isinstance(stage, str) else stage
+        now = processor()
+        found[name], before = now - before if own is None else own, now
     return found
 
 
 def main() -> None:
-    """A line a size."""
+    """A line a size, and one with the growth exponents."""
     words = sys.argv[1:] or ["masses"]
     kind = words.pop(0) if not words[0].isdigit() else "masses"
     stages, runs = (of_masses, RUNS) if kind == "masses" else (of_bodies, 1)
     sizes = [int(word) for word in words] or [4, 16, 64]
     warnings.simplefilter("ignore")
     measured(stages, 2)  # SymPy's own start-up
-    before: tuple[int, Sequence[float]] | None = None
+    before: tuple[int, list[float]] | None = None
     for n in sizes:
         taken = [measured(stages, n) for _ in range(runs)]
         medians = [statistics.median(run[name] for run in taken) for name in taken[0]]
         if before is None:
-            print(
-                f"{'n':>5} " + " ".join(f"{name:>9}" for name in taken[0]) + "   growth exponents"
-            )
-        growth = ""
+            print(f"{'n':>5} " + " ".join(f"{name:>10}" for name in taken[0]))
+        print(f"{n:5d} " + " ".join(f"{x:10.4g}" for x in medians), flush=True)
         if before is not None:
-            growth = "  ".join(
-                f"{math.log(max(b, 0.01) / max(a, 0.01)) / math.log(n / before[0]):.2f}"
-                for a, b in zip(before[1], medians, strict=True)
-            )
-        line = " ".join(f"{seconds:9.3f}" for seconds in medians)
-        print(f"{n:5d} {line}   {growth}", flush=True)
+            ratio = math.log(n / before[0])
+            growth = [math.log(b / a) / ratio for a, b in zip(before[1], medians, strict=True)]
+            print(f"{'':>5} " + " ".join(f"{e:10.2f}" for e in growth), flush=True)
         before = (n, medians)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from ctypes import byref, c_double, c_int
 
@@ -13,6 +14,7 @@ from sympy.physics.mechanics import dynamicsymbols
 from test_jumps import lifted
 
 from lagfmu import Contact, Holonomic, Input, Model, Parameter
+from lagfmu.testing import prepare
 
 G, RADIUS = 10.0, 0.2
 t = dynamicsymbols._t
@@ -65,6 +67,21 @@ def table() -> Model:
         ],
         parameters=[MASS, GRAVITY, Parameter(R, RADIUS, "m")],
         start={z: 0.0},
+    )
+
+
+def masses_on_springs() -> Model:
+    """x_0 = 0 and x_101 = 101 L are walls."""
+    x = dynamicsymbols("x1:101")
+    k, L = symbols("k L", positive=True)
+    stretched = (b - a - L for a, b in itertools.pairwise((0, *x, 101 * L)))
+    kinetic = sum(m * s.diff() ** 2 / 2 for s in x)
+    return Model(
+        "MassesOnSprings",
+        lagrangian=kinetic - sum(k * by**2 / 2 for by in stretched),
+        coordinates=dict.fromkeys(x, "m"),
+        parameters=[MASS, Parameter(k, 200, "N/m"), Parameter(L, 1, "m")],
+        start={s: float(j) for j, s in enumerate(x, 1)},
     )
 
 
@@ -163,6 +180,18 @@ def test_time_has_no_unit(library):
     assert sizes[1] == pytest.approx(sizes[0], rel=1e-12)
     assert speeds[1] == pytest.approx(1e3 * speeds[0], rel=1e-9)
     assert alphas[1] == pytest.approx(1e3 * alphas[0], rel=1e-6)
+
+
+def test_many_masses_on_springs_at_rest_have_their_highest_frequency_as_rate(of):
+    """A hundred masses between two walls, tied by springs of length L, stand at places j L: in their
+    fastest motion neighbours go against each other, at 2 sqrt(k/m) = 20/s.  Rounding of the places shakes
+    them by eps j L 20/s, and ten tolerances of 1e-8 of a speed that counts are no less."""
+    one = of(masses_on_springs).continuous()
+    sizes, speeds = np.reshape(one.array("GetNominalsOfContinuousStates", 200), (100, 2)).T
+    np.testing.assert_allclose(sizes, np.arange(1, 101), rtol=1e-12)
+    shaken = np.finfo(float).eps * 20
+    np.testing.assert_allclose(speeds / sizes, 10 / 1e-8 * shaken, rtol=1e-6)
+    assert prepare(masses_on_springs()).structure.start.rate == pytest.approx(20, rel=1e-6)
 
 
 def test_a_skate_that_slips_sideways_is_set_straight(library):

@@ -224,8 +224,8 @@ class Session:
             (getattr(self.instance, f"get{kind}"), self.references(those))
             for kind, those in self._by_kind(names)
         ]
-        order = [n for _, those in self._by_kind(names) for n in those]
-        places = [order.index(n) for n in names]
+        order = {n: k for k, n in enumerate(n for _, those in self._by_kind(names) for n in those)}
+        places = [order[n] for n in names]
         if places == list(range(len(places))):
             return lambda: [x for get, those in parts for x in get(those)]
 

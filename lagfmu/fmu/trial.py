@@ -18,12 +18,17 @@ def check_start(prepared: Prepared, description: bytes, library: bytes, path: st
     """Initialize an instance of `library`, that of this machine, whose place in the FMU is `path`.  Raises
     CannotStartError with its reason."""
     with tempfile.TemporaryDirectory(prefix="lagfmu_") as folder:
-        Path(folder, "modelDescription.xml").write_bytes(description)
-        place = Path(folder, path)
-        place.parent.mkdir(parents=True)
-        place.write_bytes(library)
+        lay_out(Path(folder), description, library, path)
         try:
             with Session(folder) as session:
                 session.begin()
         except RefusalError as error:
             raise CannotStartError(prepared.model.name, [error.message], prepared) from error
+
+
+def lay_out(folder: Path, description: bytes, library: bytes, path: str) -> None:
+    """An FMU as it lies unpacked, of its description and a library alone."""
+    (folder / "modelDescription.xml").write_bytes(description)
+    place = folder / path
+    place.parent.mkdir(parents=True)
+    place.write_bytes(library)

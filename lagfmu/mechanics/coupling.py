@@ -29,20 +29,6 @@ def sharing_inertia(eom: EquationsOfMotion) -> list[frozenset[int]]:
     return [frozenset(g) for g in connected_components((range(eom.nv), list(eom.M.todok())))]
 
 
-def holding(eom: EquationsOfMotion) -> tuple[tuple[int, ...], ...]:
-    """Of each coordinate (nq) the equations M v' = F + G^T lambda and, as nv + k, G v' = gamma that hold
-    it."""
-    place = {q: j for j, q in enumerate(eom.q)}
-    found: list[set[int]] = [set() for _ in eom.q]
-    masses = [((i,), e) for (i, _), e in eom.M.todok().items()]
-    jacobian = [((j, eom.nv + k), e) for (k, j), e in eom.G.todok().items()]
-    forces = [((i,), e) for i, e in enumerate((*eom.F, *eom.gamma))]
-    for lines, e in (*masses, *jacobian, *forces):
-        for j in {place[s] for s in e.free_symbols if s in place}:
-            found[j].update(lines)
-    return tuple(tuple(sorted(lines)) for lines in found)
-
-
 def _tied(eom: EquationsOfMotion, pairs: list[tuple[int, int]]) -> list[Group]:
     pairs = [*pairs, *((eom.nv + k, j) for k, j in eom.G.todok())]
     groups = connected_components((range(eom.nv + eom.m), pairs))

@@ -110,13 +110,13 @@ class EquationsOfMotion(Displayed):
 
     q (nq), v (nv): coordinates and speeds, q' = `qdot` (nq), the same as v where the model has no speeds of
     its own; u: inputs (with derivatives where they are needed); p: parameters.  M (nv, nv) and G (m, nv)
-    are sparse; `constraints` (m) are those of the rows of G.  F (nv) holds all forces without lambda, nu
-    and gamma (m) the right-hand sides of G v = nu and G vdot = gamma, f (m) the residual of a position
-    constraint (None for a nonholonomic one). `symbols` maps the model's dynamicsymbols to the plain
-    symbols, `rates` a prescribed motion u to der(u) and der(u) to der(u,2).  Energies in joule: `kinetic`
-    is the part of L that is quadratic in v, `potential` minus the part without v; their sum is Jacobi's
-    integral.  `outputs` are the model's own, in the same symbols and those of accelerations (`vdot`),
-    lambda (`lam`) and Q (`Q`).
+    are sparse (and mutable: SymPy sorts the entries of immutable ones, which takes a fifth of a derivation);
+    `constraints` (m) are those of the rows of G.  F (nv) holds all forces without lambda, nu and gamma (m)
+    the right-hand sides of G v = nu and G vdot = gamma, f (m) the residual of a position constraint (None for
+    a nonholonomic one). `symbols` maps the model's dynamicsymbols to the plain symbols, `rates` a prescribed
+    motion u to der(u) and der(u) to der(u,2).  Energies in joule: `kinetic` is the part of L that is
+    quadratic in v, `potential` minus the part without v; their sum is Jacobi's integral.  `outputs` are the
+    model's own, in the same symbols and those of accelerations (`vdot`), lambda (`lam`) and Q (`Q`).
 
     A scene may need less than the model (prune.py): then some coordinates and constraints are not
     there, `numbers` are the values of the parameters and inputs that were folded in, and `bare`
@@ -292,7 +292,7 @@ class EquationsOfMotion(Displayed):
         def sparse(matrix: Expr) -> Expr:
             entries = matrix.todok().items()
             values = {ij: e for ij, a in entries if (e := change(a)) != 0}
-            return sp.ImmutableSparseMatrix(matrix.rows, matrix.cols, values)
+            return sp.SparseMatrix(matrix.rows, matrix.cols, values)
 
         kinetic, potential = each((self.kinetic, self.potential))
         return replace(
@@ -463,9 +463,9 @@ def derive(model: Model) -> EquationsOfMotion:
         qdot=qdot,
         u=u,
         p=tuple(p.symbol for p in model.parameters),
-        M=sp.ImmutableSparseMatrix(len(v), len(v), M),
+        M=sp.SparseMatrix(len(v), len(v), M),
         F=tuple(F),
-        G=sp.ImmutableSparseMatrix(len(nu), len(v), G),
+        G=sp.SparseMatrix(len(nu), len(v), G),
         nu=tuple(nu),
         gamma=tuple(gamma),
         f=tuple(f),

@@ -173,7 +173,7 @@ def only(
         row = {k: i for i, k in enumerate(of)}
         column = {j: i for i, j in enumerate(js)}
         values = matrix.todok().items()
-        return sp.ImmutableSparseMatrix(
+        return sp.SparseMatrix(
             len(of),
             len(js),
             {(row[i], column[j]): a for (i, j), a in values if i in row and j in column},
@@ -255,7 +255,7 @@ def read_only(form: Form, outputs: Collection[str]) -> Form:
     rates = [n for n in outputs if names.read(n).order or names.read(n).quantity in ENERGIES]
     rates += [o.name for o in eom.outputs if o.name in outputs and symbols_of(o) & set(eom.v)]
     moving = bool(set(rates) - of_s)  # of what is read, velocities are asked for
-    nothing = sp.ImmutableSparseMatrix(len(js), len(js), {})
+    nothing = sp.SparseMatrix(len(js), len(js), {})
     zeros = (sp.S.Zero,) * len(js)
     return replace(
         form,

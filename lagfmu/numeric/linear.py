@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lapack, qr, solve_triangular
-from scipy.sparse import coo_array, csc_array, csr_array
+from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components, structural_rank
 from scipy.sparse.linalg import splu
 
@@ -34,7 +34,6 @@ from .thresholds import (
 
 REGULAR = 1e-14  # reciprocal condition above which a matrix is not singular
 APART = 1e-8  # that of [[1, G^T], [G, 0]] above which each of its rows stands out by far from the others
-WIDE = 256  # right-hand sides that are solved for together
 DEFINITE = 1e-4  # least pivot of the Cholesky factor of a mass matrix with a unit diagonal
 CONTRADICTION = (
     "the constraints contradict each other at this state: dependent rows of G ask for different "
@@ -132,17 +131,14 @@ def factor(M: Sparse, G: Sparse, least: float = 0.0, from_masses: bool = False) 
     return Factored(n, lu, d, A.astype(np.longdouble))
 
 
-def responses(M: Sparse, G: Sparse, right: Sparse) -> Iterator[Matrix]:
-    """x (n, k) for columns (b, c) of `right` (n + m, all k), some at a time; not refined."""
-    n, right, factored = M.shape[0], csc_array(right), factor(M, G) or factor(M, G, 0.0, True)
-    if not np.isfinite(right.data).all():
+def responses(M: Sparse, G: Sparse, right: Matrix) -> Matrix:
+    """x (n, k) for right-hand sides (n + m, k); not refined."""
+    n, factored = M.shape[0], factor(M, G) or factor(M, G, 0.0, True)
+    if not np.isfinite(right).all():
         raise StepFailureError("a force is not finite near this state")
-    for first in range(0, right.shape[1], WIDE):
-        some = right[:, first : first + WIDE].toarray()
-        if factored is None:
-            yield np.array([solve(M, r[:n], G, r[n:])[0] for r in some.T]).T
-        else:
-            yield factored.columns(some)
+    if factored is not None:
+        return factored.columns(right)
+    return np.array([solve(M, r[:n], G, r[n:])[0] for r in right.T]).reshape(-1, n).T
 
 
 def _kkt(M: Sparse, G: Sparse) -> Sparse:

@@ -9,8 +9,8 @@ dimension: tau is the shortest time in which anything changes, 1/rate of the coo
 V/A.  Parameters and angles alone give that rate (a place may be far away, and says nothing), and V/A the
 forces before they cancel.
 
-A displacement of each coordinate in turn tells what holds it: dvdot, were it displaced by its size.  At rest
-on springs that balance, what is left of the acceleration is rounding, and sqrt(|dvdot| / size) is the rate.
+A displacement of each coordinate tells what holds it: dvdot, were it displaced by its size.  At rest on
+springs that balance, what is left of the acceleration is rounding, and sqrt(|dvdot| / size) is the rate.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
 
 from .failure import StepFailureError
 from .instant import Instant
 from .linear import responses
 from .motion import Motion
 from .system import Sparse, System, Vector
-from .thresholds import DISPLACED, LOST
+from .thresholds import DISPLACED, LOST, LOTS
 
+SIDES = (5**0.5 - 1) / 2  # golden ratio: its multiples fall on both sides in no period
 Mask = NDArray[np.bool_]
 
 
@@ -129,49 +129,28 @@ def natural(
 def _held(
     at: Instant, q: Vector, v: Vector, size: Vector, now: Motion, rows: Sequence[int]
 ) -> Vector:
-    """Accelerations (nv) with which a state comes back if each coordinate in turn is displaced by its size,
-    linearly; 0 at the edge of what the equations describe.
+    """Accelerations (nv) with which a state comes back if each coordinate is displaced by its size, linearly,
+    in at most LOTS lots of those that stand far apart, to sides that the golden ratio chooses, so that none
+    cancel; 0 at the edge of what the equations describe.
 
-    A displacement leaves r = (F + G^T lambda - M vdot, gamma - G vdot) of the equations, where those are that
-    hold the coordinate; K (dvdot, -dlambda) = r, K the matrix before it.  Frictions push as they did.
+    A displacement leaves r = (F + G^T lambda - M vdot, gamma - G vdot) of the equations;
+    K (dvdot, -dlambda) = r, K the matrix before it.  Frictions push as they did.
     """
-    system, back = at.system, np.zeros(len(now.vdot))
+    system, place = at.system, np.arange(len(q))
     lines = [*range(system.nv), *(system.nv + k for k in rows)]
+    sides = np.where(place // LOTS * SIDES % 1 < 0.5, DISPLACED, -DISPLACED)
 
-    def left(place: Vector) -> Vector:
-        M, F, G, _, gamma = at.equations(place, v)
-        return np.concatenate([F + G.T @ now.lam - M @ now.vdot, gamma - G @ now.vdot])
+    def left(lot: int | None = None) -> Vector:
+        there = q + np.where(place % LOTS == lot, sides * size, 0.0)
+        M, F, G, _, gamma = at.equations(there, v)
+        return np.concatenate([F + G.T @ now.lam - M @ now.vdot, gamma - G @ now.vdot])[lines]
 
     try:
-        before, changes = left(q), list[tuple[float, int, int]]()
-        for group in _apart(system, np.flatnonzero(size).tolist()):
-            moved = q.copy()
-            moved[group] += DISPLACED * size[group]
-            change = (left(moved) - before) / DISPLACED
-            for j in group:
-                changes += [(change[i], i, j) for i in system.held_by(j)]
-        values, line, place = np.array(changes).reshape(-1, 3).T
-        r = csr_array((values, (line.astype(int), place.astype(int))), (len(before), system.nq))
-        for x in responses(now.M, now.G[rows], r[lines]):
-            back += np.abs(x).sum(axis=1)
+        before, lots = left(), sorted(set((np.flatnonzero(size) % LOTS).tolist()))
+        r = np.array([(left(lot) - before) / DISPLACED for lot in lots]).reshape(-1, len(lines))
+        return np.abs(responses(now.M, now.G[rows], r.T)).sum(axis=1)
     except StepFailureError:
         return np.zeros(len(now.vdot))
-    return back
-
-
-def _apart(system: System, coordinates: Sequence[int]) -> list[list[int]]:
-    """Groups of coordinates of which no equation holds two."""
-    groups: list[list[int]] = []
-    taken: list[set[int]] = []
-    for j in coordinates:
-        own = system.held_by(j)
-        g = next((g for g, lines in enumerate(taken) if lines.isdisjoint(own)), len(groups))
-        if g == len(groups):
-            groups.append([])
-            taken.append(set())
-        groups[g].append(j)
-        taken[g].update(own)
-    return groups
 
 
 def _rates(system: System, span: Vector, speed: Vector, pull: Vector, counted: Mask) -> list[float]:

@@ -102,9 +102,6 @@ class System:
 
     starts(p) -> the start values that are expressions of parameters, at the positions `started` of (q, v).
 
-    `reads`: of each coordinate the equations that hold it, those of the speeds and then (nv + k) of the rows;
-    empty where that is not known.
-
     `estimated` are those of `prescribed` that are followed by a third derivative.  `outputs` are those of
     the model's own.  `energies` is None where they are not read.  The full
     system of an embedding may hold coordinates that are only read: then `dynamics`, `residual` and
@@ -145,7 +142,6 @@ class System:
     driven: int = 0
     started: tuple[int, ...] = ()
     starts: Callable[..., Any] | None = None
-    reads: tuple[tuple[int, ...], ...] = ()
 
     @cached_property
     def nq(self) -> int:
@@ -182,10 +178,6 @@ class System:
         for j, i in zip(*self.rates, strict=True):
             found[i].append(j)
         return tuple(map(tuple, found))
-
-    def held_by(self, j: int) -> Sequence[int]:
-        """The equations that may hold coordinate j, numbered as in `reads`."""
-        return self.reads[j] if self.reads else range(self.nv + self.m)
 
     @cached_property
     def m(self) -> int:

@@ -11,7 +11,7 @@ import random
 import warnings
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import chain
 from typing import Any
 
@@ -22,7 +22,6 @@ from ..errors import CannotStartError, DerivationError, ModelError
 from ..interface.table import variable_table
 from ..interface.variables import VariableTable
 from ..mechanics import prune
-from ..mechanics.coupling import holding
 from ..mechanics.equations import EquationsOfMotion
 from ..mechanics.form import Form
 from ..model.model import Contact, name_of
@@ -67,19 +66,13 @@ class Posed:
 
 def posed(value: Lowered) -> Posed:
     """The start in the scene, before anything was left out of the code."""
-    return Posed(value.form.equations, value.whole, known(value.form, value.examined), value.fixed)
+    return Posed(value.form.equations, value.whole, value.examined, value.fixed)
 
 
 def whole(value: Lowered) -> Posed:
     """The start of the model in all its coordinates, every contact free to open."""
     form = Form(value.derived)
-    system = known(form, lower(form))
-    return Posed(value.derived, variable_table(form, value.scene), system, value.fixed)
-
-
-def known(form: Form, system: System) -> System:
-    """The system of a form, with what its symbols tell: which equations hold which coordinate."""
-    return replace(system, reads=holding(form.stepped))
+    return Posed(value.derived, variable_table(form, value.scene), lower(form), value.fixed)
 
 
 def examined_structure(value: Lowered) -> Structure:

@@ -100,7 +100,7 @@ def reduce(eom: EquationsOfMotion) -> Reduction:
         q=s,
         v=sdot,
         qdot=sdot,
-        M=sp.ImmutableSparseMatrix(N, N, {k: m for k, m in Mr.items() if m != 0}),
+        M=sp.SparseMatrix(N, N, {k: m for k, m in Mr.items() if m != 0}),
         F=Fr,
         G=G,
         nu=nu,
@@ -194,7 +194,7 @@ def _remaining(
         position: Expr = eom.f[k]
         f.append(None if position is None else position.xreplace(into))
         rows.append(k)
-    matrix = sp.ImmutableSparseMatrix(len(rows), N, G)
+    matrix = sp.SparseMatrix(len(rows), N, G)
     return tuple(rows), matrix, tuple(nu), tuple(gamma), tuple(f)
 
 

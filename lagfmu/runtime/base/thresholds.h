@@ -29,7 +29,8 @@ static const double LARGEST_TOLERANCE = 0.1; /* ... and from 0.7 on steps go thr
 /* ---- the motion's own sizes and times ---- */
 static const double TOUCH = 1e-9; /* |f| below this, in the constraint's own size, counts as touching */
 static const double LOST = 1e3 * DBL_EPSILON; /* what projections leave of a place, or cancelling forces */
-static const double DISPLACED = 0x1p-20; /* of a coordinate's size, to see what holds it */
+static const double DISPLACED = 0x1p-20; /* of a coordinate's size, to see what holds it, ... */
+enum { LOTS = 64 }; /* ... in so many lots at most: every 64th is displaced at once */
 
 /* ---- contacts and impacts ---- */
 enum { CONTACTS_MOST = 12 };              /* contacts whose combinations are tried one by one */

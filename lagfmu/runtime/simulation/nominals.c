@@ -16,8 +16,9 @@
  * Speeds that are no rates of coordinates move several of these: what such a speed moves is as large as the
  * largest of its own dimension (mechanism_reach()), and its span takes the place of the size.
  *
- * A displacement along each speed in turn tells what holds it: dvdot, were it displaced by its
- * size.  The rate of small oscillations is omega = sqrt(|dvdot| / size), and rounding of q shakes v by
+ * A displacement along each speed tells what holds it: dvdot, were it displaced by its size; of many
+ * speeds those that stand far apart in the list are displaced at once.
+ * The rate of small oscillations is omega = sqrt(|dvdot| / size), and rounding of q shakes v by
  * eps |dvdot| (|q| / size) / omega: on stiff springs that is more than rounding of v itself, and no step
  * could be small enough to resolve it.  So does rounding of the forces by which rows hold a body still,
  * eps |F|/m / rate.  At rest on springs that balance, what is left of the
@@ -39,14 +40,21 @@ static const double MEASURED_PART = 1e-3; /* of the first step, in which a motio
 static const double SHAKEN = 1e9; /* times the tolerance: roundings of q that an error of v may reach */
 static const double STILL = 1e-100; /* scale of what neither moves nor is pushed: anything else exceeds it */
 static const double FASTEST = 1e150; /* [1/s] of a motion */
+static const double SIDES = 0.61803398874989485; /* golden ratio: its multiples fall on both sides in no period */
+static const double UNTOLD = -1; /* what no size and no rate is: those of one dimension are found together */
 
 static double positive(double x) { return x > 0 ? x : STILL; }
 
 void nominals_extents(const System *s, const double *p, double *least) {
+    for (int j = 0; j < s->nq; j++) least[j] = UNTOLD;
     for (int j = 0; j < s->nq; j++) {
-        least[j] = s->folded != NULL ? s->folded[j] : 0;
+        double largest = 0;
+        if (least[j] >= 0) continue;
         for (int i = 0; i < s->parameters; i++)
-            if (s->extent_dimension[i] == s->dimension[j]) least[j] = larger(least[j], fabs(p[i]));
+            if (s->extent_dimension[i] == s->dimension[j]) largest = larger(largest, fabs(p[i]));
+        for (int i = j; i < s->nq; i++)
+            if (s->dimension[i] == s->dimension[j])
+                least[i] = larger(s->folded != NULL ? s->folded[i] : 0, largest);
     }
 }
 
@@ -170,21 +178,23 @@ int nominals_incomplete(const Solver *s) {
     return incomplete;
 }
 
-static double mass_of(const Mechanism *b, int j) {
+/* mass (nv): the diagonal of M. */
+static void find_masses(const Mechanism *b, double *mass) {
     const System *s = b->system;
+    for (int j = 0; j < s->nv; j++) mass[j] = 0;
     for (int e = 0; e < s->masses; e++)
-        if (s->mass_row[e] == j && s->mass_column[e] == j) return b->M[e];
-    return 0;
+        if (s->mass_row[e] == s->mass_column[e]) mass[s->mass_row[e]] = b->M[e];
 }
 
 /* Accelerations (nv) before forces cancel.  Times the root of its mass all have one dimension, in which what is
  * rounding of the largest is none: where no force has a lever arm, that of a torque would be all that turns a body. */
-static void find_felt(const Mechanism *b, double *forces, double *felt) {
+static void find_felt(const Mechanism *b, double *work, double *felt) {
     double most = 0;
-    mechanism_at_work(b, forces, felt);
-    for (int j = 0; j < b->system->nv; j++) most = larger(most, sqrt(mass_of(b, j)) * felt[j]);
+    mechanism_at_work(b, work, felt);
+    find_masses(b, work);
+    for (int j = 0; j < b->system->nv; j++) most = larger(most, sqrt(work[j]) * felt[j]);
     for (int j = 0; j < b->system->nv; j++)
-        if (sqrt(mass_of(b, j)) * felt[j] < DBL_EPSILON * most) felt[j] = 0;
+        if (sqrt(work[j]) * felt[j] < DBL_EPSILON * most) felt[j] = 0;
 }
 
 /* A rate whose square is a double too. */
@@ -216,19 +226,22 @@ static double largest_alike(const System *s, int dimension, const double *x) {
 
 void nominals_motion_speeds(const Mechanism *b, const double *speed, double *shared) {
     const System *s = b->system;
+    const int *dimension = s->speed_dimension;
     double momentum = 0;
     for (int e = 0; e < s->masses; e++)
         if (s->mass_row[e] == s->mass_column[e] && b->M[e] > 0)
             momentum = larger(momentum, sqrt(b->M[e]) * speed[s->mass_row[e]]);
-    for (int j = 0; j < s->nv; j++) shared[j] = 0;
-    for (int e = 0; e < s->masses; e++) /* the heaviest of each speed's dimension */
-        if (s->mass_row[e] == s->mass_column[e])
-            for (int j = 0; j < s->nv; j++)
-                if (s->speed_dimension[j] == s->speed_dimension[s->mass_row[e]])
-                    shared[j] = larger(shared[j], b->M[e]);
+    for (int j = 0; j < s->nv; j++) shared[j] = UNTOLD;
     for (int j = 0; j < s->nv; j++) {
-        const double own = shared[j] > 0 ? momentum / sqrt(shared[j]) : 0;
-        shared[j] = larger(own, largest_alike(s, s->speed_dimension[j], speed));
+        double heaviest = 0;
+        if (shared[j] >= 0) continue;
+        for (int e = 0; e < s->masses; e++)
+            if (s->mass_row[e] == s->mass_column[e] && dimension[s->mass_row[e]] == dimension[j])
+                heaviest = larger(heaviest, b->M[e]);
+        const double own = heaviest > 0 ? momentum / sqrt(heaviest) : 0;
+        const double largest = larger(own, largest_alike(s, dimension[j], speed));
+        for (int i = j; i < s->nv; i++)
+            if (dimension[i] == dimension[j]) shared[i] = largest;
     }
 }
 
@@ -249,18 +262,21 @@ static double find_own(Solver *s, double span, const double *felt, double *own) 
     const System *system = s->system;
     double *least = s->work_initial, steady = 0, natural = 0;
     nominals_extents(system, s->p, least);
+    const double slowest = slowest_rate(s);
     for (int i = 0; i < system->nv; i++)
         if (mechanism_reach(&s->stepped, least, i) > 0 || system->speed_dimension[i] == system->angles)
             steady = larger(steady, rate_of_speed(s, i, s->state.v[i], felt[i]));
+    for (int j = 0; j < system->nq; j++) own[j] = s->state.size[j] > 0 ? 0 : UNTOLD;
     for (int j = 0; j < system->nq; j++) {
-        own[j] = 0;
-        if (s->state.size[j] > 0) continue;
+        if (own[j] >= 0) continue;
         const double speed = largest_alike(system, system->dimension[j], s->state.v);
-        own[j] = larger(steady, speed > 0 ? largest_alike(system, system->dimension[j], felt) / speed : 0);
-        if (own[j] > 0) own[j] = larger(own[j], slowest_rate(s));
-        own[j] = bounded(own[j]);
-        natural = larger(natural, own[j]);
-        if (!(own[j] > 0) && span > 0) own[j] = 1 / (MEASURED_PART * span);
+        double rate = larger(steady, speed > 0 ? largest_alike(system, system->dimension[j], felt) / speed : 0);
+        if (rate > 0) rate = larger(rate, slowest);
+        rate = bounded(rate);
+        natural = larger(natural, rate);
+        if (!(rate > 0) && span > 0) rate = 1 / (MEASURED_PART * span);
+        for (int i = j; i < system->nq; i++)
+            if (own[i] < 0 && system->dimension[i] == system->dimension[j]) own[i] = rate;
     }
     return natural;
 }
@@ -274,9 +290,24 @@ static void displace(const Mechanism *b, int i, double by, double *q) {
     }
 }
 
-/* back (nv): accelerations with which the state comes back if it is displaced along each speed in turn by
- * its span, linearly; shaken (nv): the speeds by which rounding of the coordinates shakes it.  Both 0 at
- * the edge of what the equations describe.  `stepped` is at the state before and after. */
+/* A lot of displacements by their spans: along every LOTSth speed from the first on, to sides that the golden
+ * ratio chooses, so that none cancel.  Returns the largest place among these, in spans; < 0: none has a span. */
+static double displace_lot(Solver *s, Instant at, int first, const double *q) {
+    Mechanism *b = &s->stepped;
+    double part = -1;
+    mechanism_kinematics(b, at, q);
+    for (int j = first; j < s->system->nv; j += LOTS) {
+        const double span = s->state.span[j], side = fmod(SIDES * (j / LOTS), 1) < 0.5 ? 1 : -1;
+        if (!(span > 0)) continue;
+        part = larger(part, mechanism_place(b, q, j) / span);
+        displace(b, j, side * DISPLACED * span, s->state.q);
+    }
+    return part;
+}
+
+/* back (nv): accelerations with which the state comes back if it is displaced along each speed by its span,
+ * in at most LOTS lots, linearly; shaken (nv): the speeds by which rounding of the coordinates shakes it.  Both
+ * 0 at the edge of what the equations describe.  `stepped` is at the state before and after. */
 static Status find_held(Solver *s, Instant at, double *back, double *shaken) {
     const int nv = s->system->nv;
     State *state = &s->state;
@@ -286,18 +317,15 @@ static Status find_held(Solver *s, Instant at, double *back, double *shaken) {
     memcpy(vdot, b->vdot, (size_t)nv * sizeof *vdot);
     memcpy(q, state->q, (size_t)s->system->nq * sizeof *q);
     for (int i = 0; i < nv; i++) back[i] = shaken[i] = 0;
-    for (int j = 0; j < nv && evaluated; j++) {
-        const double span = state->span[j];
-        if (!(span > 0)) continue;
-        mechanism_kinematics(b, at, q);
-        const double place = mechanism_place(b, q, j);
-        displace(b, j, DISPLACED * span, state->q);
+    for (int lot = 0; lot < LOTS && lot < nv && evaluated; lot++) {
+        const double part = displace_lot(s, at, lot, q);
+        if (part < 0) continue;
         evaluated = mechanism_motion(b, at, state->q, state->v, solver_rows(s)) == OK;
         memcpy(state->q, q, (size_t)s->system->nq * sizeof *q);
         for (int i = 0; i < nv; i++) {
             const double change = fabs(b->vdot[i] - vdot[i]) / DISPLACED;
             back[i] += change;
-            shaken[i] += DBL_EPSILON * change * (place / span);
+            shaken[i] += DBL_EPSILON * change * part;
         }
     }
     for (int i = 0; i < nv; i++)
@@ -338,12 +366,14 @@ static void take_sizes(Solver *s, const double *felt, const double *own) {
     double *reach = s->work_initial;
     int taken = 0;
     for (int j = 0; j < system->nq; j++) {
-        if (!(own[j] > 0)) continue;
+        if (!(own[j] > 0) || s->state.size[j] > 0) continue;
         const double speed = largest_alike(system, system->dimension[j], s->state.v);
         double acceleration = largest_alike(system, system->dimension[j], b->vdot);
         const double pull = largest_alike(system, system->dimension[j], felt);
         if (acceleration <= LOST * pull) acceleration = pull; /* at rest: the rest is rounding */
-        s->state.size[j] = larger(speed / own[j], acceleration / own[j] / own[j]);
+        const double size = larger(speed / own[j], acceleration / own[j] / own[j]);
+        for (int i = j; i < system->nq; i++)
+            if (own[i] > 0 && system->dimension[i] == system->dimension[j]) s->state.size[i] = size;
         taken = 1;
     }
     if (!taken) return;
