@@ -12,6 +12,7 @@ of a few times), and how large it, its description and the memory of an instance
 
 from __future__ import annotations
 
+import gc
 import math
 import os
 import statistics
@@ -24,7 +25,9 @@ from pathlib import Path
 from typing import Any
 from unittest import mock
 
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command does
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # these three as the command does
+os.environ.setdefault("SYMPY_CACHE_SIZE", "50000")
+gc.set_threshold(100_000, 20, 20)
 
 from fmpy import calloc
 from sympy import symbols

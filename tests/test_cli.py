@@ -342,8 +342,8 @@ def test_the_version_is_that_of_the_package():
 
 @pytest.mark.parametrize("words", [["--version"], ["--help"], ["sweep", "--help"]])
 def test_help_and_version_are_told_without_waiting(words):
-    """`python -m lagfmu` imports nothing that calculates for what can be said without it, and keeps NumPy to
-    one thread."""
+    """`python -m lagfmu` imports nothing that calculates for what can be said without it, keeps NumPy to one
+    thread and lets SymPy remember the symbols of long chains."""
     code = (
         f"import runpy, sys\nsys.argv = {['lagfmu', *words]!r}\n"
         "try: runpy.run_module('lagfmu', run_name='__main__')\n"
@@ -351,8 +351,10 @@ def test_help_and_version_are_told_without_waiting(words):
         "heavy = {'sympy', 'numpy', 'scipy', 'pint', 'fmpy', 'matplotlib', 'xarray'}\n"
         "assert not heavy & sys.modules.keys(), heavy & sys.modules.keys()\n"
         "import os; assert os.environ['OPENBLAS_NUM_THREADS'] == '1'  # before NumPy reads it\n"
+        "from sympy.core.cache import SYMPY_CACHE_SIZE as size; assert size == 50000\n"
     )
-    without = {k: v for k, v in os.environ.items() if k != "OPENBLAS_NUM_THREADS"}
+    own = ("OPENBLAS_NUM_THREADS", "SYMPY_CACHE_SIZE")
+    without = {k: v for k, v in os.environ.items() if k not in own}
     run = subprocess.run(
         [sys.executable, "-c", code], env=without, capture_output=True, text=True, check=False
     )

@@ -243,22 +243,22 @@ class EquationsOfMotion(Displayed):
             *self.gamma,
         ]
 
-    @property
+    @cached_property
     def vdot(self) -> tuple[Expr, ...]:
         """The symbols of the accelerations v' (nv)."""
         return tuple(sp.Symbol(rate_of(str(v)), real=True) for v in self.v)
 
-    @property
+    @cached_property
     def lam(self) -> tuple[Expr, ...]:
         """The symbols of the multipliers (m)."""
         return tuple(multiplier(c.name) for c in self.constraints)
 
-    @property
+    @cached_property
     def Q(self) -> tuple[Expr, ...]:
         """The symbols of the generalized forces of constraint (nv)."""
         return tuple(force_of_constraint(sp.Symbol(name)) for name in self.directions)
 
-    @property
+    @cached_property
     def directions(self) -> tuple[str, ...]:
         """What the forces of constraint are on (nv): a coordinate whose rate is the speed, else the speed."""
         return tuple(read(str(v)).coordinate for v in self.v)

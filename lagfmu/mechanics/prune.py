@@ -164,7 +164,8 @@ def only(
     if len(speeds) == eom.nv and len(rows) == eom.m:
         return eom
     js, ks = sorted(speeds), sorted(rows)
-    moved = [j for j, by in enumerate(_moved(eom)) if not by or by & set(js)]
+    stay, hold = frozenset(js), frozenset(ks)
+    moved = [j for j, by in enumerate(_moved(eom)) if not by or by & stay]
 
     def pick(group: Sequence[Any], which: Sequence[int]) -> tuple[Any, ...]:
         return tuple(group[i] for i in which)
@@ -180,10 +181,10 @@ def only(
         )
 
     kept = {eom.constraints[k].name for k in ks}
-    away = [j for j in range(eom.nv) if j not in js]
-    gone = {q for j, q in enumerate(eom.q) if j not in moved} | {eom.v[j] for j in away}
+    away = [j for j in range(eom.nv) if j not in stay]
+    gone = {*eom.q}.difference(eom.q[j] for j in moved) | {eom.v[j] for j in away}
     unsolved = gone | {s for j in away for s in (eom.vdot[j], eom.Q[j])}
-    unsolved |= {s for k, s in enumerate(eom.lam) if k not in ks}
+    unsolved |= {s for k, s in enumerate(eom.lam) if k not in hold}
 
     def whole(energy: Expr) -> Expr:
         return None if energy is None or energy.free_symbols & gone else energy
