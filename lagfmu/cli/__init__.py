@@ -16,7 +16,7 @@ def main() -> None:
     gc.set_threshold(100_000, 20, 20)  # SymPy makes many objects and few cycles, ...
     atexit.register(gc.freeze)  # ... which need not be searched for where the process ends
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # of small matrices threads wait for a core
-    os.environ.setdefault("SYMPY_CACHE_SIZE", "50000")  # of 1,000 it forgets symbols from 50 bodies on
+    os.environ.setdefault("SYMPY_CACHE_SIZE", "50000")  # of 1,000 it forgets a chain's symbols
     signal.signal(signal.SIGTERM, _end)  # by the way on which temporary folders go
     if sys.argv[1:] == ["--version"]:
         print(tool())
