@@ -25,9 +25,8 @@ from pathlib import Path
 from typing import Any
 from unittest import mock
 
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # these three as the command does
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command does, ...
 os.environ.setdefault("SYMPY_CACHE_SIZE", "50000")
-gc.set_threshold(100_000, 20, 20)
 
 from fmpy import calloc
 from sympy import symbols
@@ -175,6 +174,7 @@ def main() -> None:
     stages, runs = (of_masses, RUNS) if kind == "masses" else (of_bodies, 1)
     sizes = [int(word) for word in words] or [4, 16, 64]
     warnings.simplefilter("ignore")
+    gc.set_threshold(100_000, 20, 20)  # ... like this
     measured(stages, 2)  # SymPy's own start-up
     before: tuple[int, list[float]] | None = None
     for n in sizes:
