@@ -148,9 +148,10 @@ def _held(
     try:
         before, lots = left(), sorted(set((np.flatnonzero(size) % LOTS).tolist()))
         r = np.array([(left(lot) - before) / DISPLACED for lot in lots]).reshape(-1, len(lines))
-        return np.abs(responses(now.M, now.G[rows], r.T)).sum(axis=1)
+        back: Vector = np.abs(responses(now.M, now.G[rows], r.T)).sum(axis=1)
     except StepFailureError:
         return np.zeros(len(now.vdot))
+    return back
 
 
 def _rates(system: System, span: Vector, speed: Vector, pull: Vector, counted: Mask) -> list[float]:
