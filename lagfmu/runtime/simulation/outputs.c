@@ -85,11 +85,13 @@ void outputs_unique(Mechanism *b, Instant at, Observed *o) {
     double *slope = o->work_unique, *any = slope + s->m * s->unique_count, *length = any + s->m, *x = length + s->m;
     int all = 1;
     for (int k = 0; k < s->m; k++) all &= o->unique[k];
-    if (!all) {
+    const int some = !all && outputs_told_apart(s);
+    if (some) {
         find_slopes(s, at, o, any, any_multipliers(s, o->lambda, any), slope, x + s->nv);
         find_lengths(b, x, length);
     }
-    for (int i = 0; i < s->unique_count; i++) o->own_unique[i] = all || is_in_range(b, slope + i * s->m, length, x);
+    for (int i = 0; i < s->unique_count; i++)
+        o->own_unique[i] = all || (some && is_in_range(b, slope + i * s->m, length, x));
 }
 
 /* What is the same with all multipliers changes as it does with those of least norm. */

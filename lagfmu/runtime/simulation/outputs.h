@@ -12,9 +12,13 @@ SHARED Status outputs_observe(const System *s, Instant at, Observed *o, Why *why
 /* Are those of which it is asked the same with all multipliers of this motion?  `b` as it was factored for it. */
 SHARED void outputs_unique(Mechanism *b, Instant at, Observed *o);
 
-/* What that needs: slopes, multipliers, lengths of rows, x, values and those where they have none. */
+/* Beyond, where rows that depend on each other are refused (linear.h), all multipliers are unique. */
+static inline int outputs_told_apart(const System *s) { return s->nv + s->m <= DENSE_MOST; }
+
+/* What that needs: values and those where they have none, slopes, multipliers, lengths of rows, x. */
 static inline int outputs_unique_doubles(const System *s) {
-    return s->unique_count == 0 ? 0 : s->m * (s->unique_count + 2) + s->nv + 3 * s->output_count;
+    const int apart = outputs_told_apart(s) ? s->m * (s->unique_count + 2) + s->nv : 0;
+    return s->unique_count == 0 ? 0 : apart + 3 * s->output_count;
 }
 
 /* Their changes w->down along a direction (full coordinates), from those that `sensitivity_along` found
