@@ -14,6 +14,12 @@ from functools import lru_cache
 BUNDLE = "runtime.c"
 INCLUDE = re.compile(rb'^#include "(\w+\.[ch])"$', re.MULTILINE)
 INCLUDED = re.compile(rb'^/\* (#include "\w+\.[ch]") \*/$', re.MULTILINE)
+# comments, texts and inclusions
+SILENT = re.compile(rb'/\*.*?\*/|"(?:[^"\\\n]|\\.)*"', re.DOTALL)
+DEFINED = re.compile(  # for other files: a function, or a value
+    rb"^(?!static|SHARED )[A-Za-z_][\w \*]*?\b(\w+)(?:\[[^\]]*\])*(?:\(| = )", re.MULTILINE
+)
+USED = re.compile(rb"(?<![.\w])(?<!->)[A-Za-z_]\w*")  # no member of a structure
 HEAD = b"""/* runtime.c -- the part of lagfmu's runtime that this FMU holds: its files one behind the other,
  * each below its name.  What one includes stands above it. */
 """
@@ -40,6 +46,28 @@ def reached(files: Mapping[str, bytes], begin: Iterable[str]) -> list[str]:
     for file in begin:
         visit(file)
     return [*found]
+
+
+@lru_cache(maxsize=1024)
+def _names(text: bytes) -> tuple[frozenset[bytes], frozenset[bytes]]:
+    """Those that a C file defines for others, and those that it uses, its own among them."""
+    code = SILENT.sub(b"", text)
+    return frozenset(DEFINED.findall(code)), frozenset(USED.findall(code))
+
+
+def linked(runtime: Mapping[str, bytes], generated: Mapping[str, bytes], begin: str) -> list[str]:
+    """The C files of the runtime that are reached by name, as a linker finds them, from the generated files
+    and those whose names `begin` so.  What a generated file defines is looked for nowhere else."""
+    files = {f: text for f, text in {**runtime, **generated}.items() if f.endswith(".c")}
+    owner = {name: f for f, text in files.items() for name in _names(text)[0]}
+    waiting = [f for f in files if f in generated or f.startswith(begin)]
+    found = set(waiting)
+    while waiting:
+        used = _names(files[waiting.pop()])[1]
+        more = {owner[name] for name in used & owner.keys()} - found
+        found |= more
+        waiting += more
+    return [f for f in files if f in found and f not in generated]
 
 
 def bundled(runtime: Mapping[str, bytes], generated: Mapping[str, bytes]) -> dict[str, bytes]:

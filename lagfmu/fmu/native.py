@@ -6,16 +6,15 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 
-from .. import names
 from ..codegen.c.equations import model_source
 from ..codegen.c.interface import interface_source
-from ..codegen.c.optional import files_left_out, held, needs_tangents, optional_source
+from ..codegen.c.optional import held, needs_tangents, optional_source
 from ..codegen.c.tables import entanglements
 from ..codegen.c.variables import variables_source
 from ..errors import BuildError
 from ..prepare.prepare import Prepared
 from .archive import pack, tool
-from .bundle import BUNDLE, bundled, reached
+from .bundle import BUNDLE, bundled, linked, reached
 from .capabilities import interfaces_of
 from .compiler import HOST, Platform, chosen, compile_libraries, host, is_first
 from .described import untold
@@ -123,11 +122,9 @@ def sources_of(prepared: Prepared, listed: bool = True, face: Face = USUAL) -> S
             f"scene {scene.name!r}: rattle cannot step these equations: {'; '.join(problems)}; choose "
             "another method"
         )
-    everything = runtime_files()
+    everything = {f: text for f, text in runtime_files().items() if face.holds(f)}
     integrators = held(scene, form)
-    dae = bool(table.those(names.RESIDUAL_RATE))
     measured, joints = bool(table.measured), bool(form.joint_coordinates)
-    gone = files_left_out(scene, system, integrators, measured, dae, joints)
     tangents, adjoints = needs_tangents(scene, system), None
     if face.fmi == 3:
         adjoints = tangents and scene.differentiable and not system.frictions
@@ -137,13 +134,12 @@ def sources_of(prepared: Prepared, listed: bool = True, face: Face = USUAL) -> S
         "variables.c": variables_source(table, form, scene, system).encode(),
         "optional.c": optional_source(scene, system, integrators, measured, joints).encode(),
     }
-    gone |= generated.keys() | {file for file in everything if not face.holds(file)}
     if face.fmi == 3:
         inside = arrays(table)
         scalars = len(table.variables) - len(inside)
         told = (scalars, *dependencies(table), inside, not untold(table))
         generated["interface.c"] = interface_source(scene.name, *told).encode()
-    own = [f for f in everything if f.endswith(".c") and f not in gone]
+    own = linked(everything, generated, f"fmi{face.fmi}")
     found = reached({**everything, **generated}, [*own, *generated])
     runtime = {file: everything[file] for file in found if file not in generated}
     watched = len(system.contacts) + len(system.switches) + 2 * len(system.frictions)
