@@ -172,9 +172,9 @@ def _system(parts: Parts) -> str:
     if changing:
         texts["bounds"] = _bounds(parts, changing)
     texts |= {f.name: _define(f, _reported(parts, names)) for f in own}
-    tables = Tables(parts)
-    text = tables.of_what_is_read if parts.eom.bare else tables.text
-    return "\n".join([*texts.values(), text(set(texts))])
+    tables = Tables(parts, texts)
+    last = tables.of_what_is_read() if parts.eom.bare else tables.text()
+    return "\n".join([*texts.values(), last])
 
 
 def _adjoints(parts: Parts) -> str:

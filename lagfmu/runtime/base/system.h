@@ -7,7 +7,7 @@
  * nq coordinates q, nv speeds v, m constraint rows.  M and G are passed as the lists of their structurally non-zero
  * values: M's lower triangle (row >= column), G row by row, both sorted by (row, column).  That
  * layout is decided by the code printer (codegen/c/) and described by the patterns below.  SI units.
- * model.c, which is generated, defines one `const System`. */
+ * model.c, which is generated, defines one `const System`; a table without entries is NULL there. */
 #ifndef LAGFMU_SYSTEM_H
 #define LAGFMU_SYSTEM_H
 
