@@ -81,6 +81,15 @@ def test_what_the_angle_does_not_know_is_said(pendulum, swing):
     assert any("not used: lambda.rod" in text for text in found.remarks())
 
 
+def test_what_alone_is_free_and_moves_nothing_stays(pendulum, swing):
+    """The mass is no matter to the angle: its derivative is what runs scatter by, and the search ends where
+    it began."""
+    found = lagfmu.fit(pendulum, noisy(swing, 1, theta=1e-3), ["m"], ["theta"])
+    assert found.values["m"] == 1.0
+    assert np.isinf(found.errors["m"])
+    assert "not determined by the data: a change of m by +1 %" in repr(found)
+
+
 def test_an_error_is_what_noise_does(pendulum, swing, tmp_path):
     """The standard error of each value is the spread of the values over 60 draws of the noise, within what 60
     draws tell of a spread (30 % is more than three of its standard deviations)."""

@@ -68,9 +68,11 @@ class Residuals:
         found = np.column_stack(columns) * weights[:, None]
         scale = np.array([f.scale(v) for f, v in zip(self.problem.free, x, strict=True)])
         left, size, right = np.linalg.svd(found * scale, full_matrices=False)
-        size[size < self.noise * size[0]] = 0.0
+        scatter = self.tolerance / (1.0 if self.own else self.difference)
+        least = max(self.noise * size[0], scatter * np.linalg.norm(self.measured * weights))
+        size[size < least] = 0.0
         kept = (left * size) @ right
-        kept[:, np.linalg.norm(kept, axis=0) < self.noise * size[0]] = 0.0
+        kept[:, np.linalg.norm(kept, axis=0) < least] = 0.0
         return np.asarray(kept / scale)
 
     def _told(self, x: Floats) -> dict[str, Floats]:
