@@ -14,7 +14,7 @@ from sympy import symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Contact, Holonomic, Input, Model, Nonholonomic, Parameter, Scene, simulate
-from lagfmu.errors import LagfmuWarning, ModelError
+from lagfmu.errors import LagfmuWarning, ModelError, SettingError
 
 W = np.pi / 8.0
 
@@ -58,6 +58,20 @@ def test_a_table_without_rates_is_told_by_simulate(native_fmu):
     with pytest.warns(LagfmuWarning, match="prescribed motion l has moved") as heard:
         simulate(native_fmu("Crane"), 2.0, 0.1, start_values=still, inputs=table)
     assert sum(issubclass(w.category, LagfmuWarning) for w in heard) == 1
+
+
+def test_a_file_of_inputs_drives_what_its_table_drives(native_fmu, tmp_path):
+    """A hoist at 0.5 m/s, in a CSV file and as an array: the same bits.  What is neither is refused."""
+    path, crane = tmp_path / "hoist.csv", native_fmu("Crane")
+    path.write_text('time,l,der(l),"der(l,2)"\n0,7.5,0.5,0\n1,8,0.5,0\n')
+    fields = [(n, float) for n in ("time", "l", "der(l)", "der(l,2)")]
+    table = np.array([(0.0, 7.5, 0.5, 0.0), (1.0, 8.0, 0.5, 0.0)], dtype=fields)
+    runs = [
+        simulate(crane, 1.0, 0.1, inputs=inputs).tobytes() for inputs in (str(path), path, table)
+    ]
+    assert runs[0] == runs[1] == runs[2]
+    with pytest.raises(SettingError, match="dict, expected the path of a CSV file"):
+        simulate(crane, 1.0, inputs={"time": [0.0], "l": [7.0]})
 
 
 @pytest.mark.parametrize("h", [0.02, 0.1, 0.5, 1.0])

@@ -17,11 +17,11 @@ import numpy as np
 from .. import names
 from ..errors import VerificationError
 from ..fmu.archive import tool
-from ..fmu.read import Trajectory, experiment_of, read_description
+from ..fmu.read import experiment_of, read_description
 from ..live.playable import Told, told_by
 from ..verification.check import Verification
 from ..verification.evaluate import alone
-from ..verification.reference import Reference
+from ..verification.reference import Driven, Reference
 from ..verification.result import Result
 from ..verification.simulate import simulate
 from ..verification.verify import verify
@@ -79,7 +79,7 @@ def findings(
     stop_time: float | None = None,
     step_size: float | None = None,
     tolerance: float | None = None,
-    inputs: Trajectory | None = None,
+    inputs: Driven | None = None,
     reference: Reference | None = None,
     statements: str | os.PathLike[str] | None = None,
 ) -> Findings:

@@ -8,13 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import UsageError
-from ..fmu.read import Trajectory
 from ..fmu.write import as_fmu, write_whole
 from ..model.model import Model
 from ..model.scene import Scene
 from ..page.template import template
 from ..verification.check import Verification
-from ..verification.reference import Reference
+from ..verification.reference import Driven, Reference
 from . import figures, tables
 from .findings import Findings, findings
 from .pdf import printed
@@ -35,7 +34,7 @@ def report(
     stop_time: float | None = None,
     step_size: float | None = None,
     tolerance: float | None = None,
-    inputs: Trajectory | None = None,
+    inputs: Driven | None = None,
     reference: Reference | None = None,
     statements: str | os.PathLike[str] | None = None,
 ) -> Path:

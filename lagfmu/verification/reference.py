@@ -7,6 +7,7 @@ reference.  Between communication points a Real is interpolated linearly, what i
 from __future__ import annotations
 
 import csv
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -18,6 +19,7 @@ from ..errors import SettingError
 from ..fmu.read import Trajectory
 from .check import Check, Missed
 
+Driven = Trajectory | str | os.PathLike[str]  # inputs over time: a table, or a CSV file
 TRUTH = {"True": 1.0, "False": 0.0, "true": 1.0, "false": 0.0}
 
 
@@ -74,6 +76,18 @@ def at(result: Trajectory, name: str, times: NDArray[np.float64]) -> NDArray[np.
         return np.asarray(np.interp(times, result["time"], column))
     place = np.searchsorted(result["time"], times * (1 + 1e-12), side="right") - 1
     return np.asarray(column[np.clip(place, 0, len(column) - 1)], dtype=float)
+
+
+def driven(inputs: Driven | None) -> Trajectory | None:
+    """A table of inputs as simulate() takes it.  Raises SettingError for what is none."""
+    if isinstance(inputs, (str, os.PathLike)):
+        return read_table(Path(inputs))
+    if inputs is not None and getattr(getattr(inputs, "dtype", None), "names", None) is None:
+        raise SettingError(
+            f"inputs: {type(inputs).__name__}, expected the path of a CSV file, or a structured array with "
+            "'time' [s] and a field for each input (of a DataFrame: to_records(index=False))"
+        )
+    return inputs
 
 
 def read_table(path: Path, gaps: bool = False) -> Trajectory:

@@ -41,6 +41,7 @@ from ..numeric.start_priority import LEFT_OUT
 from ..numeric.tolerance import tolerance_problem
 from ..prepare.prepare import Prepared, prepare
 from ..prepare.starts import tell
+from .reference import Driven, driven
 from .result import Result
 
 if TYPE_CHECKING:
@@ -67,7 +68,7 @@ def simulate(
     step_size: float | None = None,
     tolerance: float | None = None,
     start_values: Mapping[str, Any] | None = None,
-    inputs: Trajectory | None = None,
+    inputs: Driven | None = None,
     scene: Scene | str | None = None,
     besides: Sequence[str] = (),
     error_bars: bool = False,
@@ -81,7 +82,8 @@ def simulate(
     what to install.
 
     Times in seconds; `start_values` maps parameters, coordinates, velocities and `solver.*` to values;
-    `inputs` is a structured array with 'time' and one field an input, interpolated linearly.  What is left
+    `inputs` is a structured array with 'time' and one field an input, or a CSV file of such columns,
+    interpolated linearly.  What is left
     out comes from the scene, or the FMU's DefaultExperiment.  `besides`: local variables and inputs to be
     recorded too.  `error_bars`: a model's outputs have `error.NAME` beside them (docs/error_bars.md), as
     those of an FMU have that was built with them.
@@ -99,7 +101,9 @@ def simulate(
         source, scene, _ = in_scene(source, scene)
     if isinstance(source, Model):
         source = prepare(source, in_scene(source, scene).scene)
-    asked = _Asked(stop_time, step_size, tolerance, dict(start_values or {}), inputs, besides)
+    asked = _Asked(
+        stop_time, step_size, tolerance, dict(start_values or {}), driven(inputs), besides
+    )
     if isinstance(source, Prepared):
         if error_bars and not source.asked.error_bars:
             source = prepare(source.model, replace(source.asked, error_bars=True))

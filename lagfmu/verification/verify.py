@@ -23,7 +23,7 @@ from ..model.model import Model
 from ..model.scene import Scene
 from .check import Against, Check, Verification
 from .closed_forms import check_closed_form
-from .reference import Reference
+from .reference import Driven, Reference
 from .simulate import simulate, steps_of
 from .statements import read_statements
 
@@ -41,7 +41,7 @@ def verify(
     stop_time: float | None = None,
     step_size: float | None = None,
     tolerance: float | None = None,
-    inputs: Trajectory | None = None,
+    inputs: Driven | None = None,
     reference: Reference | None = None,
     statements: str | os.PathLike[str] | None = None,
     *,

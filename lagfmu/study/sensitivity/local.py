@@ -39,6 +39,7 @@ from ...model.scene import Scene
 from ...model.units import for_reading
 from ...numeric.tolerance import tolerance_problem
 from ...page.table import as_text, new_table
+from ...verification.reference import Driven, driven
 
 Floats = NDArray[np.float64]
 TOLERANCE = 1e-11  # of the runs: their noise limits the differences
@@ -160,7 +161,7 @@ def sensitivity(
     stop_time: float | None = None,
     step_size: float | None = None,
     tolerance: float = TOLERANCE,
-    inputs: Trajectory | None = None,
+    inputs: Driven | None = None,
     scene: Scene | str | None = None,
 ) -> Sensitivity:
     """How outputs at the end of a run change with parameters and start values, at the values given.
@@ -171,6 +172,7 @@ def sensitivity(
     """
     if problem := tolerance_problem(tolerance):
         raise SettingError(problem)
+    inputs = driven(inputs)
     with made_for(source, of, to, scene) as path, Session(path) as session:
         description, rules, given = session.description, session.rules, dict(start_values or {})
         variables = {v.name: v for v in description.modelVariables}

@@ -35,6 +35,7 @@ from ...model.model import Model
 from ...model.rule import Rule
 from ...model.scene import Scene
 from ...numeric.tolerance import tolerance_problem
+from ...verification.reference import Driven, driven
 from .design import Design, Values, design
 from .engine import asked_to_stop, closed, connected, distributed, local
 from .keep import kept as parsed
@@ -64,7 +65,7 @@ def sweep(
     stop_time: float | None = None,
     step_size: float | None = None,
     tolerance: float | None = None,
-    inputs: Trajectory | None = None,
+    inputs: Driven | None = None,
     scene: Scene | str | None = None,
     out: str | os.PathLike[str] | None = None,
     on: Any = None,
@@ -98,7 +99,7 @@ def sweep(
     with as_fmu(source, scene, peaks=peaked(keep)) as path:
         varied = _design(vary, sample, runs, seed, sampling, rows)
         times = _times(path, stop_time, step_size)
-        study = _study(path, varied, keep, times, tolerance, inputs, command)
+        study = _study(path, varied, keep, times, tolerance, driven(inputs), command)
         if study.layout.kept.trajectories and path_out is not None and path_out.suffix in ROWS:
             raise SettingError(
                 f"trajectories do not fit a {path_out.suffix} file: --out FILE.nc or FILE.zarr"
