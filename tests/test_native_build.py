@@ -41,6 +41,7 @@ from lagfmu.testing import (
     host,
     prepare,
     reached,
+    sources_of,
     unbundled,
     write,
 )
@@ -537,6 +538,22 @@ def test_an_object_of_the_cache_that_is_not_whole_is_made_anew(tmp_path, monkeyp
         place.write_bytes(spoilt)
         assert library() == expected
         assert place.read_bytes() == whole
+
+
+def test_what_two_fmus_hold_alike_is_compiled_once(prepared, monkeypatch):
+    """A pendulum and a machine, each with one rod and no contact, differ by their equations and variables."""
+    compiled: list[str] = []
+    compile_one = compiler._compile
+
+    def told(*arguments: str) -> None:
+        compiled.append(arguments[2])
+        compile_one(*arguments)
+
+    monkeypatch.setattr(compiler, "_compile", told)
+    for name in ("PendulumCartesian", "Atwood"):
+        compiled.clear()
+        sources_of(prepared(name)).compiled(name, (host(),))
+    assert compiled == ["model.c", "variables.c"]
 
 
 def test_an_empty_cache_folder_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
