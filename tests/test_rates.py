@@ -13,7 +13,7 @@ from instance import instance
 from sympy import symbols
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import Contact, Holonomic, Input, Model, Nonholonomic, Parameter, Scene, simulate
+from lagfmu import Contact, Holonomic, Input, Model, Nonholonomic, Parameter, Scene, simulate, sweep
 from lagfmu.errors import LagfmuWarning, ModelError, SettingError
 
 W = np.pi / 8.0
@@ -58,6 +58,8 @@ def test_a_table_without_rates_is_told_by_simulate(native_fmu):
     with pytest.warns(LagfmuWarning, match="prescribed motion l has moved") as heard:
         simulate(native_fmu("Crane"), 2.0, 0.1, start_values=still, inputs=table)
     assert sum(issubclass(w.category, LagfmuWarning) for w in heard) == 1
+    with pytest.warns(LagfmuWarning, match=r"l moves, and the table leaves out der\(l\)"):
+        sweep(native_fmu("Crane"), {"m": [1.0, 2.0]}, inputs=table, stop_time=2.0)
 
 
 def test_a_file_of_inputs_drives_what_its_table_drives(native_fmu, tmp_path):

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import SettingError
+from ..errors import LagfmuWarning, SettingError
 from ..interface.rules import problems_of
 from ..model.rule import Rule, missing
+from ..names import rate_of
 from .read import Trajectory
 
 
@@ -29,6 +31,29 @@ def check_inputs(table: Trajectory | None, rules: Mapping[str, Rule], known: Seq
         problems += [text for text in problems_of(rules, values) if text not in problems]
     if problems:
         raise SettingError(f"inputs: {'; '.join(problems)}")
+
+
+def warn_of_rates(table: Trajectory | None, rules: Mapping[str, Rule]) -> None:
+    """Warns of motions in a table whose rates it leaves out, and which move otherwise than these begin: for
+    runs whose FMU nobody hears."""
+    if table is None:
+        return
+    fields, apart = table.dtype.names or (), np.diff(table["time"])
+    left = {}
+    for n in fields:
+        rate = rate_of(n)
+        if n != "time" and rate in rules and rate not in fields:
+            slopes = np.diff(table[n])[apart > 0] / apart[apart > 0]
+            if not np.allclose(slopes, float(rules[rate].start or 0.0)):
+                left[n] = rate
+    if left:
+        warnings.warn(
+            f"inputs: {', '.join(left)} moves, and the table leaves out {', '.join(left.values())}, so that "
+            "the forces of constraint are wrong: add these columns, or build the FMU with "
+            'Input(..., rates="estimated")',
+            LagfmuWarning,
+            stacklevel=3,
+        )
 
 
 def columns_at(

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy import optimize
 
 from ...errors import SettingError, SimulationError
+from ...fmu.inputs import warn_of_rates
 from ...fmu.session import RefusalError, Session
 from ...fmu.write import as_fmu
 from ...model.model import Model
@@ -84,6 +85,8 @@ def fit(
             offset,
         )
         step = step_size or session.experiment.step_size
+        for one in asked.series:
+            warn_of_rates(one.inputs, session.rules)
         residuals = Residuals(asked, session, tolerance, step, given)
         return _solve(session.description.modelName, asked, residuals, loss)
 

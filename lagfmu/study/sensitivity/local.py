@@ -20,7 +20,7 @@ from rich.table import Table
 
 from ... import names
 from ...errors import SettingError, SimulationError
-from ...fmu.inputs import check_inputs, columns_at, jumps
+from ...fmu.inputs import check_inputs, columns_at, jumps, warn_of_rates
 from ...fmu.read import (
     Trajectory,
     communication_points,
@@ -179,6 +179,7 @@ def sensitivity(
         asked = settable(variables, rules) if to in (ALL, [ALL], (ALL,)) else list(to)
         _check(variables, rules, of, asked, given)
         check_inputs(inputs, rules, session.inputs)
+        warn_of_rates(inputs, rules)
         experiment = experiment_of(description, stop_time, step_size)
         points = communication_points(experiment.stop_time, experiment.step_size)
         runs = _Runs(session, np.union1d(points, jumps(inputs, points)), tolerance, inputs, of)

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ...errors import SettingError, SimulationError
 from ...fmu.archive import unpack, version
 from ...fmu.batch import Plan
-from ...fmu.inputs import check_inputs, columns_at
+from ...fmu.inputs import check_inputs, columns_at, warn_of_rates
 from ...fmu.read import (
     Trajectory,
     communication_points,
@@ -177,6 +177,7 @@ def _study(
     outputs = [n for n, v in variables.items() if v.causality == "output"]
     kept = parsed(keep, {n: kind_of(v) for n, v in variables.items()}, outputs)
     check_inputs(inputs, rules, [n for n, v in variables.items() if v.causality == "input"])
+    warn_of_rates(inputs, rules)
     driven = columns_at(inputs, times, rules)
     _check(varied, rules, driven)
     size = 8 * len(varied) * (len(kept.numbers) + len(kept.trajectories) * len(times))
