@@ -232,6 +232,17 @@ def coordinates(known: Iterable[str]) -> list[str]:
     return [s.coordinate for s in subjects if s.quantity == VALUE and s.order == 2]
 
 
+def of_interest(known: Iterable[str]) -> list[str]:
+    """What a reader asks for first: of a mechanism the force in each joint and the coordinates of joints,
+    elsewhere every multiplier and the coordinates."""
+    texts = list(known)
+    forces = [n for n in texts if n.startswith("force.") and n.endswith(".norm")]
+    moving = coordinates(texts)
+    if not forces:
+        return those(texts, MULTIPLIER) + moving
+    return forces + ([n for n in moving if n.startswith(("angle.", "position."))] or moving)
+
+
 def initial(text: str) -> str:
     """How closed forms call the value of a variable at the start."""
     return f"initial({text})"

@@ -101,3 +101,16 @@ def test_a_pendulum_in_names_of_several_words_pulls_as_any_other(target):
     assert run["der(height.bob,2)"] == pytest.approx(run["der(bob.position.y,2)"], rel=1e-14)
     assert not run["contact.wall.left"].any()
     assert not {"Q.A.along.bob.position.x", "departure.wall.left.bob.position.x"} & {*run.units}
+
+
+def test_of_a_mechanism_the_joints_come_first():
+    """The force in each joint and how far it has turned, not the 8 multipliers and 9 places of bodies."""
+    joints = [f"force.{j}.{x}" for j in "AB" for x in ("x", "y", "norm")]
+    rows = [f"lambda.{j}.{x}" for j in "AB" for x in "xy"]
+    moving = [n for q in ("rod.position.x", "angle.A") for n in (q, f"der({q})", f"der({q},2)")]
+    assert names.of_interest([*rows, *joints, *moving]) == [
+        "force.A.norm",
+        "force.B.norm",
+        "angle.A",
+    ]
+    assert names.of_interest([*rows, *moving]) == [*rows, "rod.position.x", "angle.A"]

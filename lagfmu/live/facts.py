@@ -37,7 +37,11 @@ def facts(
     read = fmpy.read_model_description(archive, validate=False)
     experiment = experiment_of(read)
     named = {v.name for v in read.modelVariables}
-    given = preset or {"sliders": [], "curves": [], "ranges": {}}
+    first = names.of_interest(v.name for v in read.modelVariables)
+    joints = any(
+        n.startswith("force.") for n in first
+    )  # elsewhere the page begins with whole groups
+    given = preset or {"sliders": [], "curves": first if joints else [], "ranges": {}}
     settable = {v.name for v in read.modelVariables if _role(v) in SETTABLE}
     columns = {v.name for v in read.modelVariables if _is_column(v)}
     rules = described_rules(read)

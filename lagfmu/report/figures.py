@@ -61,13 +61,10 @@ def curves(found: Findings) -> list[tuple[str, Markup]]:
     """Forces, and the motion, along the run with its events."""
     known = list(found.run.dtype.names or ())
     preset = [n for n in (found.told.preset or {}).get("curves", ()) if n in known]
-    held = forces(found)
-    norms = [n for n in held if n.endswith(".norm")]
-    pushed = [n for n in preset if n in held] or norms or held
-    moved = [n for n in preset if n not in held] or names.coordinates(known)
-    drawn = []
-    for title, chosen in (("Forces of constraint", pushed), ("Motion", moved)):
-        if chosen:
+    held, own, drawn = forces(found), names.of_interest(known), []
+    for title, push in (("Forces of constraint", True), ("Motion", False)):
+        told = ([n for n in of if (n in held) == push] for of in (preset, own))
+        if chosen := next(filter(None, told), held if push else []):
             figure = figure_of(found.run, found.units, chosen[:MOST])
             drawn.append((title, svg(figure, title)))
     return drawn

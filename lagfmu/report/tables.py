@@ -7,7 +7,7 @@ import numpy as np
 from .. import names
 from ..fmu.read import kind_of
 from ..model.units import for_reading
-from ..verification.plot import SAID, default_names, moments
+from ..verification.plot import SAID, moments
 from ..verification.result import Result, as_text
 from .findings import Findings, obtained
 
@@ -116,6 +116,6 @@ def accuracy(found: Findings) -> list[Row]:
     if found.closer is None:
         return []
     off = obtained(found.run, found.closer)
-    chosen = [n for n in (*forces(found), *default_names(list(off))) if n in off]
+    chosen = [n for n in (*forces(found), *names.of_interest(off)) if n in off]
     rows = sorted(((off[n], n) for n in dict.fromkeys(chosen)), reverse=True)
     return [(n, f"{error:.1e}") for error, n in rows[:FIRST]]

@@ -14,6 +14,7 @@ from .. import names
 from ..errors import SettingError
 from ..fmu.read import Trajectory
 from ..model.units import for_reading
+from ..names import of_interest
 
 COLOURS = (
     *("#0b6e99", "#d9730d", "#0f7b6c", "#ad1a72"),
@@ -29,11 +30,6 @@ SAID = {  # what is free from then on, dashed; what is held, dotted
 TIMES = {count: time for time, count in names.COUNT_OF.items()}
 LETTER = 0.075  # in, the width of one in the name of an event
 PER_COLUMN = 8  # curves in one column of a legend, which stands beside its panel
-
-
-def default_names(known: Sequence[str]) -> list[str]:
-    """What is plotted unless the user says otherwise: every lambda, then the coordinates."""
-    return names.those(known, names.MULTIPLIER) + names.coordinates(known)
 
 
 def plot(
@@ -68,7 +64,7 @@ def figure_of(
 
 def _chosen(result: Trajectory, names: Sequence[str]) -> list[str]:
     known = list(result.dtype.names or ())
-    chosen = list(names) or default_names(known)
+    chosen = list(names) or of_interest(known)
     unknown = [n for n in chosen if n not in known]
     if unknown or not chosen:
         raise SettingError(

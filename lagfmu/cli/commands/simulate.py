@@ -107,12 +107,11 @@ def _besides(names: Sequence[str], known: Mapping[str, str]) -> list[str]:
 
 
 def _first_of(result: Result) -> list[str]:
-    """What one looks for first: multipliers, coordinates, the times of events."""
-    from ...names import DEPARTURE_TIME, SLIP_TIME, those
-    from ...verification.plot import default_names
+    """What one looks for first, and the times of events."""
+    from ...names import DEPARTURE_TIME, SLIP_TIME, of_interest, those
 
     known = list(result.dtype.names or ())
-    return default_names(known) + those(known, DEPARTURE_TIME, SLIP_TIME)
+    return of_interest(known) + those(known, DEPARTURE_TIME, SLIP_TIME)
 
 
 def _print_last(result: Result, names: Sequence[str] = ()) -> None:
