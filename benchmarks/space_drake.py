@@ -18,6 +18,7 @@ from space import Space
 from system import G
 
 LOAD = 10.0  # N, of a joint that gives way
+LEAST = 1e-8  # m, by which it does
 
 
 def drake_tree(scheme: str) -> Callable[[Space, float], Run]:
@@ -59,7 +60,7 @@ def drake_tree(scheme: str) -> Callable[[Space, float], Run]:
             ]
             plant.AddForceElement(drake.LinearSpringDamper(*ends[0], *ends[1], s.length, s.k, s.c))
         for tie in problem.closing:
-            k = LOAD / accuracy  # N/m, at a lever of 1 m N m/rad
+            k = LOAD / max(accuracy, LEAST)  # N/m, at a lever of 1 m N m/rad
             d = 2 * sqrt(k * min(mass.m for mass, _ in linkage.bodies.values()))
             bushing = [[k, k, 0.0], [d, d, 0.0], [k] * 3, [d] * 3]
             ends = [frame(tie, tie.first), frame(tie, tie.second)]

@@ -262,9 +262,7 @@ def pinocchio_tree(problem: Space, tolerance: float) -> Run:
 
 
 PEERS = [
-    Peer(
-        "Drake, joints and bushings, third order", "drake", DECADES[:8], drake_tree("runge_kutta3")
-    ),
+    Peer("Drake, joints and bushings, third order", "drake", DECADES, drake_tree("runge_kutta3")),
     Peer("Drake, joints and bushings, Radau", "drake", DECADES[:8], drake_tree("radau3")),
     Peer("exudyn, bodies, generalized alpha", "exudyn", PARTS, exudyn_bodies(False)),
     Peer("exudyn, bodies, index 2", "exudyn", PARTS, exudyn_bodies(True)),
