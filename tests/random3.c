@@ -10,7 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "fmi3.h"
+#include "fmi3_functions.h"
 
 enum { MOST = 4, SAVED = 3, ROOM = 2000 };
 

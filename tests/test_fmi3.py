@@ -41,6 +41,12 @@ def test_the_numbers_are_those_of_fmi_2(native_fmu: Fmu, fmi3_fmu: Fmu, name: st
     assert same_bits(lagfmu.simulate(native_fmu(name)), lagfmu.simulate(fmi3_fmu(name)))
 
 
+@pytest.mark.parametrize("name", of_each_kind(FILES, kinds=FEW))
+def test_it_is_as_large_as_that_of_fmi_2(native_fmu: Fmu, fmi3_fmu: Fmu, name: str) -> None:
+    """To 5 %: equations and their derivatives stand in both, none is written once more for adjoints."""
+    assert fmi3_fmu(name).stat().st_size < 1.05 * native_fmu(name).stat().st_size
+
+
 def test_inputs_act_as_in_fmi_2(native_fmu: Fmu, fmi3_fmu: Fmu) -> None:
     """A force on the cart that rises, jumps and falls."""
     force = np.array(

@@ -14,7 +14,7 @@ TUPLES = {  # the folders of FMI 3.0 (section 2.5.1.4) where FMI 2.0 has other n
     "win64": "x86_64-windows",
     "darwin64": "x86_64-darwin",
 }
-FILES = {2: ("fmi2",), 3: ("fmi3", "dependencies.h", "adjoint.")}  # how those of one version begin
+FILES = {2: ("fmi2",), 3: ("fmi3", "dependencies.h")}  # how those of one version begin
 
 
 @dataclass(frozen=True)

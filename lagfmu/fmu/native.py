@@ -130,10 +130,8 @@ def sources_of(prepared: Prepared, listed: bool = True, face: Face = USUAL) -> S
     everything = {f: text for f, text in runtime_files().items() if face.holds(f)}
     integrators = held(scene, form)
     measured, joints = bool(table.measured), bool(form.joint_coordinates)
-    tangents, adjoints = needs_tangents(scene, system), None
-    if face.fmi == 3:
-        adjoints = tangents and scene.differentiable and not system.frictions
-    model = model_source(form, tangents, frozenset(table.varied), adjoints)
+    tangents = needs_tangents(scene, system)
+    model = model_source(form, tangents, frozenset(table.varied), grouped=face.fmi == 3)
     generated = {
         "model.c": model.encode(),
         "variables.c": variables_source(table, form, scene, system).encode(),

@@ -38,7 +38,6 @@ HEAD = """/* model.c -- {name}{description}
 #include "system.h"
 #include "variables.h"
 """
-ADJOINT = "SHARED_VALUE const Adjoint *const MODEL_ADJOINT = {};\n"
 POINTER = "\nSHARED_VALUE const System *const MODEL_SYSTEM = &{}equations;\n"
 
 
@@ -46,12 +45,12 @@ def model_source(
     form: Form,
     tangents: bool = True,
     by: frozenset[str] = frozenset(),
-    adjoints: bool | None = None,
+    grouped: bool = False,
 ) -> str:
     """C text that defines MODEL_SYSTEM, the numeric form of the equations.
 
     `tangents`: with the derivatives that directional derivatives and radau5 need; `by`: parameters by which
-    they are taken as well; `adjoints`: they can be transposed, for FMI 3.0 (None: it is another version).
+    they are taken as well; `grouped`: with the groups of their columns, for FMI 3.0.
 
     Raises DerivationError if a function or a number has no counterpart in C.
     """
@@ -68,11 +67,9 @@ def model_source(
     if len(whole) > 1:
         index += _index("coordinates that are stepped", whole[-1].eom.q)
     text = "\n".join(piece for parts in whole for piece in (*_embedding(parts), _system(parts)))
-    if adjoints:
-        text += "".join(map(_adjoints, whole))
     text += POINTER.format(whole[-1].prefix)
-    if adjoints is not None:
-        text += ADJOINT.format(f"&{whole[-1].prefix}adjoints" if adjoints else "NULL")
+    if grouped:
+        text += Tables(whole[-1]).groups()
     helpers = [
         code for name, code in {**HELPERS, **FUNCTIONS, "fill": FILL}.items() if f"{name}(" in text
     ]
@@ -80,8 +77,8 @@ def model_source(
     model = eom.model
     description = f": {model.description}" if model.description else ""
     head = HEAD.format(name=model.name, description=_comment(description), index=index)
-    if adjoints is not None:
-        head += '#include "adjoint.h"\n'
+    if grouped:
+        head += '#include "dependencies.h"\n'
     return "\n".join([head, *helpers, text])
 
 
@@ -175,11 +172,6 @@ def _system(parts: Parts) -> str:
     tables = Tables(parts, texts)
     last = tables.of_what_is_read() if parts.eom.bare else tables.text()
     return "\n".join([*texts.values(), last])
-
-
-def _adjoints(parts: Parts) -> str:
-    known = (*parts.functions, *parts.embedding)
-    return Tables(parts).adjoints({f.name: f for f in known})
 
 
 def _bounds(parts: Parts, changing: Sequence[Expr]) -> str:

@@ -33,6 +33,7 @@ SHARED_VALUE const unsigned *const RUNNING_LISTS = RUNNING;
 SHARED_VALUE const int DEPENDENCIES_TOLD = {told};
 SHARED_VALUE const unsigned *const ARRAY_LISTS = HOLDING;
 SHARED_VALUE const int ARRAY_COUNT = {array_count};
+SHARED_VALUE GetArrays *const ARRAYS = {getter};
 """
 
 
@@ -62,6 +63,7 @@ def interface_source(
         running=_lines(unknowns[1]),
         arrays=_lines(held or [0]),
         array_count=len(held),
+        getter="get_arrays" if held else "NULL",
         told=int(told),
     )
 

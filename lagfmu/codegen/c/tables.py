@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from textwrap import wrap
 from typing import Any
 
@@ -11,16 +11,9 @@ from ...mechanics.equations import EquationsOfMotion
 from ...model.model import Nonholonomic
 from ...numeric.system import CONTACT
 from ..columns import groups
-from ..parts import Function, Parts
+from ..parts import Parts
 from . import elimination
 from . import solve as csolve
-
-TRANSPOSED = {  # what is taken along a direction at once
-    "motion": ("tangent", "kinematics_tangent"),
-    "unwrapped": ("unwrapped_tangent",),
-    "outputs": ("outputs_tangent",),
-    "embed": ("embed_tangent",),
-}
 
 
 class Tables:
@@ -60,15 +53,12 @@ class Tables:
         lines = "".join(f"    .{name} = {value},\n" for name, value in self.fields.items())
         return f"{self.written}static const System {self.prefix}equations = {{\n{lines}}};\n"
 
-    def adjoints(self, tangents: Mapping[str, Function]) -> str:
-        """The Adjoint of these: the groups of their columns."""
-        p, text, fields = self.prefix, "\n", {"full": "&adjoints" if self.prefix else "NULL"}
-        for field, names in TRANSPOSED.items():
-            if found := groups([tangents[name] for name in names if name in tangents]):
-                text += self._integers(f"{field}_groups", found)
-                fields[field] = f"{p}{field}_groups"
-        lines = "".join(f"    .{name} = {value},\n" for name, value in fields.items())
-        return f"{text}static const Adjoint {p}adjoints = {{\n{lines}}};\n"
+    def groups(self) -> str:
+        """COLUMN_GROUPS of the system that is stepped."""
+        found = groups(self.parts)
+        text = self._integers("groups", found) if found else ""
+        place = f"{self.prefix}groups" if found else "NULL"
+        return f"{text}SHARED_VALUE const int *const COLUMN_GROUPS = {place};\n"
 
     def _layout(self) -> None:
         """How many coordinates and speeds there are, and their names."""

@@ -82,19 +82,18 @@ SHARED int component_deserialize(Component *c, const Call *call, const char *byt
 
 /* component_derivatives.c: how variables change along a direction (seed of the knowns), and with time.  Can partial
  * derivatives be had now, and are all arrays there; has a variable some; a direction in which so far nothing changes;
- * where a known's change stands in it (NULL: the log has why it is none). */
+ * where a known's change stands in it (NULL: the log has why it is none); what is left of it once states are settled. */
 SHARED int component_derivable(Component *c, const Call *call, int complete);
 SHARED int component_has_derivatives(const Variable *v);
 SHARED Direction component_no_direction(Component *c);
 SHARED double *component_known(Component *c, const Call *call, const Group *group, unsigned known, double change,
                                double *dt);
+SHARED void component_settle(Component *c, double dt);
 SHARED int component_directional(Component *c, const Call *call, const Group *group, const unsigned unknowns[],
                                  size_t unknown_count, const unsigned knowns[], size_t known_count,
                                  const double seed[], double sensitivity[]);
 SHARED int component_rates(Component *c, const Call *call, const Group *group, const unsigned references[],
                            size_t count, const int orders[], double values[]);
-SHARED int component_push(Component *c, const Call *call, const Group *group, const unsigned references[], size_t count,
-                          const int orders[], const double values[]); /* derivatives of inputs */
 
 /* component_exchange.c: Model Exchange.  An array that is read has `expected` values, and `given` is the room. */
 SHARED int component_state_count(void);

@@ -43,8 +43,8 @@ double *component_known(Component *c, const Call *call, const Group *group, unsi
 }
 
 /* States that are set are settled: of a direction there is what is left of it then. */
-static void settle_direction(Instance *x, double dt) {
-    Solver *s = &x->solver;
+void component_settle(Component *c, double dt) {
+    Solver *s = &c->instance.solver;
     const Sensitivity *w = &s->sensitivity;
     if (s->system->kinematics == NULL || s->system->kinematics_tangent == NULL) return;
     const Instant at = segment_instant(s, s->state.now.t);
@@ -79,7 +79,7 @@ int component_directional(Component *c, const Call *call, const Group *group, co
         *change += seed[k];
     }
     if (instance_observe_unique(&c->instance) != OK) return component_no_value(c);
-    settle_direction(&c->instance, d.dt);
+    component_settle(c, d.dt);
     if (instance_differentiate(&c->instance, d) != OK) return component_no_value(c);
     for (size_t k = 0; k < unknown_count; k++) {
         const Variable *v = component_find(c, call, unknowns[k], group);
@@ -109,25 +109,5 @@ int component_rates(Component *c, const Call *call, const Group *group, const un
         }
         if (instance_change(&c->instance, v, d, &values[k]) != OK) return component_no_derivative(c, call, v);
     }
-    return CALL_OK;
-}
-
-int component_push(Component *c, const Call *call, const Group *group, const unsigned references[], size_t count,
-                   const int orders[], const double values[]) {
-    Why text;
-    if (component_forbids(c, call)) return CALL_ERROR;
-    if (count > 0 && (references == NULL || orders == NULL || values == NULL)) return component_missing(c, call);
-    for (size_t k = 0; k < count; k++) {
-        const Variable *v = component_find(c, call, references[k], group);
-        if (v == NULL) return CALL_ERROR;
-        if (v->role == ROLE_INPUT && (orders[k] == 1 || orders[k] == 2) && isfinite(values[k])) continue;
-        (void)fail(&text,
-                   "%s: derivative %d of '%s' = %s, expected a finite derivative of an input, of "
-                   "order 1 or 2",
-                   call->name, orders[k], v->name, digits(values[k]).text);
-        return component_refuse(c, text.text);
-    }
-    for (size_t k = 0; k < count; k++)
-        instance_set_input_derivative(&c->instance, &VARIABLES[references[k]], orders[k], values[k]);
     return CALL_OK;
 }

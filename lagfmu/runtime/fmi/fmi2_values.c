@@ -1,5 +1,8 @@
 /* fmi2_values.c -- getting and setting variables (section 2.1.7), and their derivatives (2.1.9, 4.2.1). */
+#include <math.h>
+
 #include "component.h"
+#include "digits.h"
 #include "fmi2.h"
 #include "fmi2_calls.h"
 
@@ -62,7 +65,24 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component component,
 fmi2Status fmi2SetRealInputDerivatives(fmi2Component component, const fmi2ValueReference vr[],
                                        size_t nvr, const fmi2Integer order[],
                                        const fmi2Real value[]) {
-    return component_push(component, FMI2_CALL(fmi2SetRealInputDerivatives), &REAL, vr, nvr, order, value);
+    const Call *call = FMI2_CALL(fmi2SetRealInputDerivatives);
+    Component *c = component;
+    Why text;
+    if (component_forbids(c, call)) return fmi2Error;
+    if (nvr > 0 && (vr == NULL || order == NULL || value == NULL)) return component_missing(c, call);
+    for (size_t k = 0; k < nvr; k++) {
+        const Variable *v = component_find(c, call, vr[k], &REAL);
+        if (v == NULL) return fmi2Error;
+        if (v->role == ROLE_INPUT && (order[k] == 1 || order[k] == 2) && isfinite(value[k])) continue;
+        (void)fail(&text,
+                   "%s: derivative %d of '%s' = %s, expected a finite derivative of an input, of "
+                   "order 1 or 2",
+                   call->name, order[k], v->name, digits(value[k]).text);
+        return component_refuse(c, text.text);
+    }
+    for (size_t k = 0; k < nvr; k++)
+        instance_set_input_derivative(&c->instance, &VARIABLES[vr[k]], order[k], value[k]);
+    return fmi2OK;
 }
 
 fmi2Status fmi2GetRealOutputDerivatives(fmi2Component component, const fmi2ValueReference vr[],

@@ -14,10 +14,10 @@ SHARED_VALUE const Call FMI3_CALLS[FMI3_CALL_COUNT] = {FMI3_TABLE(FMI3_ROW)};
 
 /* ------------------------------------------------------------------ inquiry, logging */
 
-const char *fmi3GetVersion(void) { return fmi3Version; }
+FMI3(const char *, fmi3GetVersion)(void) { return fmi3Version; }
 
-fmi3Status fmi3SetDebugLogging(fmi3Instance instance, fmi3Boolean loggingOn, size_t nCategories,
-                               const fmi3String categories[]) {
+FMI3(fmi3Status, fmi3SetDebugLogging)(fmi3Instance instance, fmi3Boolean loggingOn, size_t nCategories,
+                                      const fmi3String categories[]) {
     return component_listen(instance, FMI3_CALL(fmi3SetDebugLogging), loggingOn, nCategories, categories);
 }
 
@@ -54,7 +54,7 @@ static Status check_request(const char *function, fmi3String name, fmi3String to
 /* One block, which holds everything; NULL: no memory. */
 static Component3 *make(fmi3String name) {
     Instance draft;
-    Directions unplaced;
+    Component3 unplaced;
     Arena arena = {NULL, 0};
     const size_t name_size = strlen(name) + 1;
     memset(&draft, 0, sizeof draft);
@@ -62,7 +62,7 @@ static Component3 *make(fmi3String name) {
     (void)arena_take(&arena, name_size, 1);
     (void)arena_take(&arena, (size_t)VARIABLE_COUNT, 1);
     instance_layout(&draft, &arena);
-    if (MODEL_ADJOINT != NULL) adjoint_layout(&unplaced, &arena, MODEL_SYSTEM);
+    component3_layout(&unplaced, &arena);
     arena = (Arena){calloc(1, arena.used), 0};
     if (arena.base == NULL) return NULL;
     Component3 *made = arena_take(&arena, 1, sizeof *made);
@@ -70,7 +70,7 @@ static Component3 *make(fmi3String name) {
     memcpy(kept, name, name_size);
     made->common.named = arena_take(&arena, (size_t)VARIABLE_COUNT, 1);
     instance_layout(&made->common.instance, &arena);
-    if (MODEL_ADJOINT != NULL) adjoint_layout(&made->directions, &arena, MODEL_SYSTEM);
+    component3_layout(made, &arena);
     made->common.name = kept;
     made->common.send = log_of;
     made->common.allocate = calloc;
@@ -96,10 +96,10 @@ static Component3 *instantiate(const char *function, fmi3String name, fmi3String
     return made;
 }
 
-fmi3Instance fmi3InstantiateModelExchange(fmi3String instanceName, fmi3String instantiationToken,
-                                          fmi3String resourcePath, fmi3Boolean visible, fmi3Boolean loggingOn,
-                                          fmi3InstanceEnvironment instanceEnvironment,
-                                          fmi3LogMessageCallback logMessage) {
+FMI3(fmi3Instance, fmi3InstantiateModelExchange)(fmi3String instanceName, fmi3String instantiationToken,
+                                                 fmi3String resourcePath, fmi3Boolean visible, fmi3Boolean loggingOn,
+                                                 fmi3InstanceEnvironment instanceEnvironment,
+                                                 fmi3LogMessageCallback logMessage) {
     (void)resourcePath; /* nothing is read from there */
     (void)visible;
     return instantiate("fmi3InstantiateModelExchange", instanceName, instantiationToken, 1, loggingOn,
@@ -115,14 +115,14 @@ static Status check_clocks(const Component3 *made, const char *function, Why *wh
     return OK;
 }
 
-fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String instantiationToken,
-                                         fmi3String resourcePath, fmi3Boolean visible, fmi3Boolean loggingOn,
-                                         fmi3Boolean eventModeUsed, fmi3Boolean earlyReturnAllowed,
-                                         const fmi3ValueReference requiredIntermediateVariables[],
-                                         size_t nRequiredIntermediateVariables,
-                                         fmi3InstanceEnvironment instanceEnvironment,
-                                         fmi3LogMessageCallback logMessage,
-                                         fmi3IntermediateUpdateCallback intermediateUpdate) {
+FMI3(fmi3Instance, fmi3InstantiateCoSimulation)(fmi3String instanceName, fmi3String instantiationToken,
+                                                fmi3String resourcePath, fmi3Boolean visible, fmi3Boolean loggingOn,
+                                                fmi3Boolean eventModeUsed, fmi3Boolean earlyReturnAllowed,
+                                                const fmi3ValueReference requiredIntermediateVariables[],
+                                                size_t nRequiredIntermediateVariables,
+                                                fmi3InstanceEnvironment instanceEnvironment,
+                                                fmi3LogMessageCallback logMessage,
+                                                fmi3IntermediateUpdateCallback intermediateUpdate) {
     static const char *const NAME = "fmi3InstantiateCoSimulation";
     Why why;
     (void)resourcePath;
@@ -139,17 +139,18 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String ins
         component3_name(made, NAME, requiredIntermediateVariables, nRequiredIntermediateVariables, &why) == OK)
         return made;
     log_text(logMessage, instanceEnvironment, fmi3Error, LOG_ERRORS, why.text);
-    fmi3FreeInstance(made);
+    free(made);
     return NULL;
 }
 
-fmi3Instance fmi3InstantiateScheduledExecution(fmi3String instanceName, fmi3String instantiationToken,
-                                               fmi3String resourcePath, fmi3Boolean visible, fmi3Boolean loggingOn,
-                                               fmi3InstanceEnvironment instanceEnvironment,
-                                               fmi3LogMessageCallback logMessage,
-                                               fmi3ClockUpdateCallback clockUpdate,
-                                               fmi3LockPreemptionCallback lockPreemption,
-                                               fmi3UnlockPreemptionCallback unlockPreemption) {
+FMI3(fmi3Instance, fmi3InstantiateScheduledExecution)(fmi3String instanceName, fmi3String instantiationToken,
+                                                      fmi3String resourcePath, fmi3Boolean visible,
+                                                      fmi3Boolean loggingOn,
+                                                      fmi3InstanceEnvironment instanceEnvironment,
+                                                      fmi3LogMessageCallback logMessage,
+                                                      fmi3ClockUpdateCallback clockUpdate,
+                                                      fmi3LockPreemptionCallback lockPreemption,
+                                                      fmi3UnlockPreemptionCallback unlockPreemption) {
     (void)instanceName;
     (void)instantiationToken;
     (void)resourcePath;
@@ -163,12 +164,13 @@ fmi3Instance fmi3InstantiateScheduledExecution(fmi3String instanceName, fmi3Stri
     return NULL;
 }
 
-void fmi3FreeInstance(fmi3Instance instance) { free(instance); }
+FMI3(void, fmi3FreeInstance)(fmi3Instance instance) { free(instance); }
 
 /* ------------------------------------------------------------------ life cycle */
 
-fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean toleranceDefined, fmi3Float64 tolerance,
-                                       fmi3Float64 startTime, fmi3Boolean stopTimeDefined, fmi3Float64 stopTime) {
+FMI3(fmi3Status, fmi3EnterInitializationMode)(fmi3Instance instance, fmi3Boolean toleranceDefined,
+                                              fmi3Float64 tolerance, fmi3Float64 startTime,
+                                              fmi3Boolean stopTimeDefined, fmi3Float64 stopTime) {
     const Call *call = FMI3_CALL(fmi3EnterInitializationMode);
     Component *c = instance;
     const double *dial = toleranceDefined ? &tolerance : NULL, *stop = stopTimeDefined ? &stopTime : NULL;
@@ -178,29 +180,29 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean tolera
     return fmi3OK;
 }
 
-fmi3Status fmi3ExitInitializationMode(fmi3Instance instance) {
+FMI3(fmi3Status, fmi3ExitInitializationMode)(fmi3Instance instance) {
     const Component *c = instance;
     const int next = c != NULL && (c->instance.exchange || c->meets) ? EVENT : STEP_COMPLETE;
     return component_initialize(instance, FMI3_CALL(fmi3ExitInitializationMode), next);
 }
 
-fmi3Status fmi3Terminate(fmi3Instance instance) {
+FMI3(fmi3Status, fmi3Terminate)(fmi3Instance instance) {
     return component_turn(instance, FMI3_CALL(fmi3Terminate), TERMINATED);
 }
 
-fmi3Status fmi3Reset(fmi3Instance instance) {
+FMI3(fmi3Status, fmi3Reset)(fmi3Instance instance) {
     if (component_forbids(instance, FMI3_CALL(fmi3Reset))) return fmi3Error;
     component_reset(instance);
     return fmi3OK;
 }
 
 /* There is nothing to configure: no structural parameters. */
-fmi3Status fmi3EnterConfigurationMode(fmi3Instance instance) {
+FMI3(fmi3Status, fmi3EnterConfigurationMode)(fmi3Instance instance) {
     (void)component_forbids(instance, FMI3_CALL(fmi3EnterConfigurationMode));
     return fmi3Error;
 }
 
-fmi3Status fmi3ExitConfigurationMode(fmi3Instance instance) {
+FMI3(fmi3Status, fmi3ExitConfigurationMode)(fmi3Instance instance) {
     (void)component_forbids(instance, FMI3_CALL(fmi3ExitConfigurationMode));
     return fmi3Error;
 }

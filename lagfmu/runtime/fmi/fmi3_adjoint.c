@@ -1,85 +1,174 @@
-/* fmi3_adjoint.c -- the gradient of a weighted sum of variables (section 2.2.11) by one transposed solve. */
+/* fmi3_adjoint.c -- the gradient of a weighted sum of variables (section 2.2.11) by one transposed solve.
+ *
+ *   M dvdot = b + G^T dlambda ,  G dvdot = c                                                   (sensitivity.c)
+ *   M x + G^T mu = a ,  -G x = l   with the weights a of dvdot and l of dlambda in the sum
+ *
+ * Along a direction the sum changes by  x . b + mu . c  and by what does not pass through dvdot and dlambda (Griewank &
+ * Walther, Evaluating Derivatives, 2008, ch. 3).  Where nothing is beside them, the directions of a group of columns, of
+ * which none changes what another does, are taken at once: along  1  each part of b and c is one derivative, and along
+ * 2^k , k = 0, 1, ... within the group, the same times 2^k without rounding, which tells k. */
 #include <math.h>
+#include <string.h>
 
+#include "dependencies.h"
 #include "digits.h"
 #include "fmi3_component.h"
 
-/* The weight of one variable, as those of what it is of. */
-static void weigh(Instance *x, const Variable *v, double weight, double *dt) {
-    Solver *s = &x->solver;
-    const int embedded = s->system->full != NULL, i = v->index;
-    const Mechanism *b = embedded ? &s->full : &s->stepped;
-    Sensitivity *stepped = &s->sensitivity, *w = embedded ? &x->along : stepped;
-    switch (v->place) {
-        case AT_Q: w->dq[i] += weight; break;
-        case AT_V: w->dv[i] += weight; break;
-        case AT_VDOT: w->dvdot[i] += weight; break;
-        case AT_QDOT: w->drate[i] += weight; break;
-        case AT_S: stepped->dq[i] += weight; break;
-        case AT_SDOT: stepped->dv[i] += weight; break;
-        case AT_SDDOT: stepped->dvdot[i] += weight; break;
-        case AT_LAMBDA: w->dlambda[i] += weight; break;
-        case AT_RESIDUAL:
-            if (b->system->rows[i].kind == NONHOLONOMIC)
-                adjoint_weigh_slip(w, b, i, weight, x->seen.v);
-            else
-                w->df[i] += weight;
-            break;
-        case AT_RESIDUAL_RATE: adjoint_weigh_slip(w, b, i, weight, x->seen.v); break;
-        case AT_RESIDUAL_ACCELERATION: adjoint_weigh_acceleration(w, b, i, weight); break;
-        case AT_FORCE: w->dforce[i] += weight; break;
-        case AT_SHARE: adjoint_weigh_share(w, b, i, weight); break;
-        case AT_KINETIC: w->denergy[0] += weight; break;
-        case AT_POTENTIAL: w->denergy[1] += weight; break;
-        case AT_TOTAL:
-            w->denergy[0] += weight;
-            w->denergy[1] += weight;
-            break;
-        case AT_OUTPUT: w->down[i] += weight; break;
-        case AT_INPUT: stepped->du[i] += weight; break;
-        case AT_TIME: *dt += weight; break;
-        default: break; /* discrete ones and parameters: they do not change */
+static int count_columns(const System *s) { return 1 + s->nq + s->nv + s->inputs; }
+
+static void place_weights(Weights *w, Arena *arena, const System *s) {
+    w->vdot = arena_doubles(arena, s->nv);
+    w->lambda = arena_doubles(arena, s->m);
+    w->b = arena_doubles(arena, s->nv);
+    w->c = arena_doubles(arena, s->m);
+}
+
+void component3_layout(Component3 *made, Arena *arena) {
+    const System *s = MODEL_SYSTEM;
+    place_weights(&made->stepped, arena, s);
+    if (s->full != NULL) place_weights(&made->full, arena, s->full);
+    made->first = arena_doubles(arena, s->nv + s->m);
+    made->column = arena_doubles(arena, count_columns(s));
+    made->gradient = arena_doubles(arena, count_columns(s));
+    made->member = arena_take(arena, (size_t)count_columns(s), sizeof *made->member);
+}
+
+/* ------------------------------------------------------------------ the sum */
+
+/* What was asked for, with its weights. */
+typedef struct {
+    Instance *x;
+    const fmi3ValueReference *unknowns;
+    const double *weights;
+    size_t count;
+} Sum;
+
+/* Its change; not a number where one of its variables has none. */
+static double find_change(const Sum *sum, Direction d) {
+    double total = 0, change;
+    for (size_t k = 0; k < sum->count; k++) {
+        (void)instance_change(sum->x, &VARIABLES[sum->unknowns[k]], d, &change);
+        total += sum->weights[k] * change;
+    }
+    return total;
+}
+
+/* Is there anything in it beside accelerations and multipliers? */
+static int is_mixed(const Sum *sum) {
+    for (size_t k = 0; k < sum->count; k++) {
+        const Place place = VARIABLES[sum->unknowns[k]].place;
+        if (place != AT_VDOT && place != AT_SDDOT && place != AT_LAMBDA) return 1;
+    }
+    return 0;
+}
+
+/* Its weights by each of some changes, all 0. */
+static void weigh(const Sum *sum, Direction none, double *changes, int count, double *weight) {
+    for (int i = 0; i < count; i++) {
+        changes[i] = 1;
+        if (is_mixed(sum)) instance_change_outputs(sum->x, none);
+        weight[i] = find_change(sum, none);
+        changes[i] = 0;
     }
 }
 
-/* What has no derivative has none along any direction: `undefined`, or NULL for another cause. */
-static Status check_defined(Component *c, const fmi3ValueReference unknowns[], size_t count,
-                            const Variable **undefined) {
-    Instance *x = &c->instance;
-    const Direction none = component_no_direction(c);
-    double change;
-    *undefined = NULL;
-    if (instance_differentiate_factored(x, none) != OK) return FAILED;
-    for (size_t k = 0; k < count; k++) {
-        if (instance_change(x, &VARIABLES[unknowns[k]], none, &change) == OK) continue;
-        *undefined = &VARIABLES[unknowns[k]];
-        return FAILED;
-    }
+/* The transposed solve. */
+static Status solve_back(const Sum *sum, Direction none, Weights *w, Sensitivity *changes, Mechanism *b) {
+    const System *s = b->system;
+    weigh(sum, none, changes->dvdot, s->nv, w->vdot);
+    weigh(sum, none, changes->dlambda, s->m, w->lambda);
+    for (int k = 0; k < s->m; k++) changes->known[k] = -w->lambda[k];
+    if (linear_nearest(&b->linear, w->vdot, changes->known, w->b, w->c) != OK) return FAILED;
+    for (int k = 0; k < s->m; k++) w->c[k] = -w->c[k]; /* which stands on the other side there */
     return OK;
 }
 
-/* The weights of what the sum of these variables depends on: in the sensitivity's direction, and *dt. */
-static Status find_gradient(Component3 *c, const fmi3ValueReference unknowns[], const double weights[],
-                            size_t count, double *dt) {
-    Instance *x = &c->common.instance;
+static double weigh_sides(const Weights *w, const Sensitivity *changes, const System *s) {
+    double sum = 0;
+    for (int i = 0; i < s->nv; i++) sum += w->b[i] * changes->b[i];
+    for (int k = 0; k < s->m; k++) sum += w->c[k] * changes->c[k];
+    return sum;
+}
+
+/* Where nothing is solved for, dvdot and dlambda are 0, but for multipliers that are given. */
+static Status find_sides(Sensitivity *w, Mechanism *b, Instant at, const double *q, const double *v, Direction d) {
+    const System *s = b->system;
+    memset(w->dvdot, 0, (size_t)s->nv * sizeof *w->dvdot);
+    memset(w->dlambda, 0, (size_t)s->m * sizeof *w->dlambda);
+    sensitivity_sides(w, b, at, q, v, d);
+    return OK;
+}
+
+/* Everything that changes along a direction but dvdot and dlambda; the sum's change with them. */
+static Status change_along(Component3 *c, const Sum *sum, Direction d, double *change) {
+    Instance *x = sum->x;
     Solver *s = &x->solver;
     const System *full = s->system->full;
-    Sensitivity *w = &s->sensitivity;
-    Directions *in = &c->directions;
-    Backward all = {.system = full, .of = MODEL_ADJOINT->full, .weights = &x->along, .along = &in->full, .in = in,
-                    .at = x->at, .seen = &x->seen, .q = x->seen.q, .v = x->seen.v};
-    Backward stepped = {.system = s->system, .of = MODEL_ADJOINT, .weights = w, .along = &in->stepped, .in = in,
-                        .at = x->at, .seen = full == NULL ? &x->seen : NULL, .q = s->state.q, .v = s->state.v};
-    if (full != NULL) adjoint_begin(&all, dt, w->du);
-    adjoint_begin(&stepped, dt, w->du);
-    for (size_t k = 0; k < count; k++) weigh(x, &VARIABLES[unknowns[k]], weights[k], dt);
-    if (full != NULL) {
-        if (adjoint_back(&all, full->dynamics != NULL ? &s->full : NULL) != OK) return FAILED;
-        adjoint_embed(&stepped, &all);
-    }
-    if (adjoint_back(&stepped, &s->stepped) != OK) return FAILED;
-    adjoint_settle(&stepped, &s->stepped);
+    component_settle(&c->common, d.dt);
+    if (instance_differentiate_by(x, d, find_sides) != OK) return FAILED;
+    *change = find_change(sum, d) + weigh_sides(&c->stepped, &s->sensitivity, s->system);
+    if (full != NULL && full->dynamics != NULL) *change += weigh_sides(&c->full, &x->along, full);
     return OK;
+}
+
+/* ------------------------------------------------------------------ groups of columns */
+
+/* Time, q, v and u as they stand in the direction. */
+static void put_columns(Component3 *c, const double *columns, Direction *d) {
+    const System *s = MODEL_SYSTEM;
+    Sensitivity *w = &c->common.instance.solver.sensitivity;
+    d->dt = columns[0];
+    memcpy(w->dq, columns + 1, (size_t)s->nq * sizeof *columns);
+    memcpy(w->dv, columns + 1 + s->nq, (size_t)s->nv * sizeof *columns);
+    memcpy(w->du, columns + 1 + s->nq + s->nv, (size_t)s->inputs * sizeof *columns);
+}
+
+/* b and c along a group, by powers of 2 where its columns are to be told apart; how many these are, and where their
+ * derivatives are. */
+static int follow_group(Component3 *c, Direction d, int number, int apart) {
+    Instance *x = &c->common.instance;
+    Solver *s = &x->solver;
+    const int count = count_columns(s->system);
+    int members = 0;
+    for (int k = 0; k < count; k++) {
+        const int own = COLUMN_GROUPS[k] == number;
+        c->column[k] = own ? ldexp(1, apart ? members : 0) : 0;
+        if (own) c->member[members++] = &c->gradient[k];
+    }
+    put_columns(c, c->column, &d);
+    component_settle(&c->common, d.dt);
+    if (members > 0) sensitivity_sides(&s->sensitivity, &s->stepped, x->at, s->state.q, s->state.v, d);
+    return members;
+}
+
+/* Adds to the derivatives by a group's columns those parts of the sum that are in b, or in c. */
+static void add_parts(const double *weight, const double *first, const double *apart, int count, double **member,
+                      int members) {
+    for (int i = 0; i < count; i++) {
+        int exponent;
+        if (weight[i] == 0 || first[i] == 0) continue;
+        const double times = apart[i] / first[i];
+        for (int k = 0; k < members && !isfinite(times); k++) *member[k] = NAN; /* whichever it is of */
+        (void)frexp(times, &exponent);
+        if (isfinite(times) && exponent >= 1 && exponent <= members) *member[exponent - 1] += weight[i] * first[i];
+    }
+}
+
+/* The gradient by all columns, where the sum is not mixed. */
+static void follow_groups(Component3 *c, Direction *d) {
+    const System *s = MODEL_SYSTEM;
+    const Sensitivity *w = &c->common.instance.solver.sensitivity;
+    double *b = c->first, *of_c = b + s->nv;
+    int members;
+    memset(c->gradient, 0, (size_t)count_columns(s) * sizeof *c->gradient);
+    for (int number = 0; (members = follow_group(c, *d, number, 0)) > 0; number++) {
+        memcpy(b, w->b, (size_t)s->nv * sizeof *b);
+        memcpy(of_c, w->c, (size_t)s->m * sizeof *b);
+        if (members > 1) (void)follow_group(c, *d, number, 1);
+        add_parts(c->stepped.b, b, w->b, s->nv, c->member, members);
+        add_parts(c->stepped.c, of_c, w->c, s->m, c->member, members);
+    }
+    put_columns(c, c->gradient, d);
 }
 
 /* Variables that have derivatives, with finite seeds? */
@@ -98,9 +187,26 @@ static int check_unknowns(Component *c, const Call *call, const fmi3ValueReferen
     return CALL_OK;
 }
 
-fmi3Status fmi3GetAdjointDerivative(fmi3Instance instance, const fmi3ValueReference unknowns[], size_t nUnknowns,
-                                    const fmi3ValueReference knowns[], size_t nKnowns, const fmi3Float64 seed[],
-                                    size_t nSeed, fmi3Float64 sensitivity[], size_t nSensitivity) {
+/* What has no derivative has none along any direction; and the transposed solves.  `undefined`, or NULL for another cause. */
+static Status prepare_sum(Component3 *c, const Sum *sum, const Variable **undefined) {
+    Instance *x = sum->x;
+    Solver *s = &x->solver;
+    const System *full = s->system->full;
+    const Direction none = component_no_direction(&c->common);
+    double change;
+    if (instance_factor(x) != OK || instance_differentiate_by(x, none, find_sides) != OK) return FAILED;
+    for (size_t k = 0; k < sum->count; k++) {
+        if (instance_change(x, &VARIABLES[sum->unknowns[k]], none, &change) == OK) continue;
+        *undefined = &VARIABLES[sum->unknowns[k]];
+        return FAILED;
+    }
+    if (solve_back(sum, none, &c->stepped, &s->sensitivity, &s->stepped) != OK) return FAILED;
+    return full == NULL || full->dynamics == NULL ? OK : solve_back(sum, none, &c->full, &x->along, &s->full);
+}
+
+FMI3(fmi3Status, fmi3GetAdjointDerivative)(fmi3Instance instance, const fmi3ValueReference unknowns[], size_t nUnknowns,
+                                           const fmi3ValueReference knowns[], size_t nKnowns, const fmi3Float64 seed[],
+                                           size_t nSeed, fmi3Float64 sensitivity[], size_t nSensitivity) {
     const Call *call = FMI3_CALL(fmi3GetAdjointDerivative);
     if (component_forbids(instance, call) || component3_miscounts(instance, call, nSeed, nUnknowns) ||
         component3_miscounts(instance, call, nSensitivity, nKnowns))
@@ -110,23 +216,30 @@ fmi3Status fmi3GetAdjointDerivative(fmi3Instance instance, const fmi3ValueRefere
     if (component_derivable(instance, call, complete) != CALL_OK ||
         check_unknowns(instance, call, unknowns, nUnknowns, seed) != CALL_OK)
         return fmi3Error;
+    Component3 *made = instance;
     Component *c = instance;
     Instance *x = &c->instance;
+    const Sum sum = {x, unknowns, seed, nUnknowns};
     const Variable *undefined = NULL;
-    double dt = 0;
-    if (MODEL_ADJOINT == NULL) {
-        (void)fail(&x->solver.why, "this FMU was built for a scene without derivatives of its outputs, or with frictions, "
-                   "which have no adjoint");
+    if (MODEL_SYSTEM->frictions > 0) {
+        (void)fail(&x->solver.why, "this FMU has frictions, which have no adjoint");
         return component_no_value(c);
     }
-    if (instance_factor(x) != OK || check_defined(c, unknowns, nUnknowns, &undefined) != OK)
+    if (prepare_sum(made, &sum, &undefined) != OK)
         return undefined != NULL ? component_no_derivative(c, call, undefined) : component_no_value(c);
-    if (find_gradient(instance, unknowns, seed, nUnknowns, &dt) != OK) return component_no_value(c);
+    Direction d = component_no_direction(c);
+    const int grouped = COLUMN_GROUPS != NULL && !x->imposed && !is_mixed(&sum);
+    if (grouped) follow_groups(made, &d);
     for (size_t k = 0; k < nKnowns; k++) {
-        const double *weight = component_known(c, call, &FLOAT64, knowns[k], 1, &dt);
-        if (weight == NULL) return fmi3Error;
-        if (!isfinite(*weight)) return component_no_derivative(c, call, &VARIABLES[unknowns[0]]);
-        sensitivity[k] = *weight;
+        double *change = component_known(c, call, &FLOAT64, knowns[k], 1, &d.dt);
+        if (change == NULL) return fmi3Error;
+        sensitivity[k] = *change;
+        if (!grouped) {
+            d = component_no_direction(c);
+            *change = 1;
+            if (change_along(made, &sum, d, &sensitivity[k]) != OK) return component_no_value(c);
+        }
+        if (!isfinite(sensitivity[k])) return component_no_derivative(c, call, &VARIABLES[unknowns[0]]);
     }
     return fmi3OK;
 }

@@ -10,77 +10,77 @@ static fmi3Status no_time_based_clock(Component *c, const Call *call, const fmi3
     return count == 0 ? fmi3OK : (fmi3Status)component_unknown(c, call, references[0], &NONE);
 }
 
-fmi3Status fmi3GetClock(fmi3Instance instance, const fmi3ValueReference valueReferences[],
-                        size_t nValueReferences, fmi3Clock values[]) {
+FMI3(fmi3Status, fmi3GetClock)(fmi3Instance instance, const fmi3ValueReference valueReferences[],
+                               size_t nValueReferences, fmi3Clock values[]) {
     return component_get(instance, FMI3_CALL(fmi3GetClock), &CLOCK, valueReferences, nValueReferences, values);
 }
 
-fmi3Status fmi3SetClock(fmi3Instance instance, const fmi3ValueReference valueReferences[],
-                        size_t nValueReferences, const fmi3Clock values[]) {
+FMI3(fmi3Status, fmi3SetClock)(fmi3Instance instance, const fmi3ValueReference valueReferences[],
+                               size_t nValueReferences, const fmi3Clock values[]) {
     return component_set(instance, FMI3_CALL(fmi3SetClock), &CLOCK, valueReferences, nValueReferences, values);
 }
 
-fmi3Status fmi3GetIntervalDecimal(fmi3Instance instance, const fmi3ValueReference valueReferences[],
-                                  size_t nValueReferences, fmi3Float64 intervals[],
-                                  fmi3IntervalQualifier qualifiers[]) {
+FMI3(fmi3Status, fmi3GetIntervalDecimal)(fmi3Instance instance, const fmi3ValueReference valueReferences[],
+                                         size_t nValueReferences, fmi3Float64 intervals[],
+                                         fmi3IntervalQualifier qualifiers[]) {
     (void)intervals;
     (void)qualifiers;
     return no_time_based_clock(instance, FMI3_CALL(fmi3GetIntervalDecimal), valueReferences, nValueReferences);
 }
 
-fmi3Status fmi3GetIntervalFraction(fmi3Instance instance, const fmi3ValueReference valueReferences[],
-                                   size_t nValueReferences, fmi3UInt64 counters[], fmi3UInt64 resolutions[],
-                                   fmi3IntervalQualifier qualifiers[]) {
+FMI3(fmi3Status, fmi3GetIntervalFraction)(fmi3Instance instance, const fmi3ValueReference valueReferences[],
+                                          size_t nValueReferences, fmi3UInt64 counters[], fmi3UInt64 resolutions[],
+                                          fmi3IntervalQualifier qualifiers[]) {
     (void)counters;
     (void)resolutions;
     (void)qualifiers;
     return no_time_based_clock(instance, FMI3_CALL(fmi3GetIntervalFraction), valueReferences, nValueReferences);
 }
 
-fmi3Status fmi3GetShiftDecimal(fmi3Instance instance, const fmi3ValueReference valueReferences[],
-                               size_t nValueReferences, fmi3Float64 shifts[]) {
+FMI3(fmi3Status, fmi3GetShiftDecimal)(fmi3Instance instance, const fmi3ValueReference valueReferences[],
+                                      size_t nValueReferences, fmi3Float64 shifts[]) {
     (void)shifts;
     return no_time_based_clock(instance, FMI3_CALL(fmi3GetShiftDecimal), valueReferences, nValueReferences);
 }
 
-fmi3Status fmi3GetShiftFraction(fmi3Instance instance, const fmi3ValueReference valueReferences[],
-                                size_t nValueReferences, fmi3UInt64 counters[], fmi3UInt64 resolutions[]) {
+FMI3(fmi3Status, fmi3GetShiftFraction)(fmi3Instance instance, const fmi3ValueReference valueReferences[],
+                                       size_t nValueReferences, fmi3UInt64 counters[], fmi3UInt64 resolutions[]) {
     (void)counters;
     (void)resolutions;
     return no_time_based_clock(instance, FMI3_CALL(fmi3GetShiftFraction), valueReferences, nValueReferences);
 }
 
-fmi3Status fmi3SetIntervalDecimal(fmi3Instance instance, const fmi3ValueReference valueReferences[],
-                                  size_t nValueReferences, const fmi3Float64 intervals[]) {
+FMI3(fmi3Status, fmi3SetIntervalDecimal)(fmi3Instance instance, const fmi3ValueReference valueReferences[],
+                                         size_t nValueReferences, const fmi3Float64 intervals[]) {
     (void)intervals;
     return no_time_based_clock(instance, FMI3_CALL(fmi3SetIntervalDecimal), valueReferences, nValueReferences);
 }
 
-fmi3Status fmi3SetIntervalFraction(fmi3Instance instance, const fmi3ValueReference valueReferences[],
-                                   size_t nValueReferences, const fmi3UInt64 counters[],
-                                   const fmi3UInt64 resolutions[]) {
+FMI3(fmi3Status, fmi3SetIntervalFraction)(fmi3Instance instance, const fmi3ValueReference valueReferences[],
+                                          size_t nValueReferences, const fmi3UInt64 counters[],
+                                          const fmi3UInt64 resolutions[]) {
     (void)counters;
     (void)resolutions;
     return no_time_based_clock(instance, FMI3_CALL(fmi3SetIntervalFraction), valueReferences, nValueReferences);
 }
 
-fmi3Status fmi3SetShiftDecimal(fmi3Instance instance, const fmi3ValueReference valueReferences[],
-                               size_t nValueReferences, const fmi3Float64 shifts[]) {
+FMI3(fmi3Status, fmi3SetShiftDecimal)(fmi3Instance instance, const fmi3ValueReference valueReferences[],
+                                      size_t nValueReferences, const fmi3Float64 shifts[]) {
     (void)shifts;
     return no_time_based_clock(instance, FMI3_CALL(fmi3SetShiftDecimal), valueReferences, nValueReferences);
 }
 
-fmi3Status fmi3SetShiftFraction(fmi3Instance instance, const fmi3ValueReference valueReferences[],
-                                size_t nValueReferences, const fmi3UInt64 counters[],
-                                const fmi3UInt64 resolutions[]) {
+FMI3(fmi3Status, fmi3SetShiftFraction)(fmi3Instance instance, const fmi3ValueReference valueReferences[],
+                                       size_t nValueReferences, const fmi3UInt64 counters[],
+                                       const fmi3UInt64 resolutions[]) {
     (void)counters;
     (void)resolutions;
     return no_time_based_clock(instance, FMI3_CALL(fmi3SetShiftFraction), valueReferences, nValueReferences);
 }
 
 /* Scheduled execution, which this FMU is not made for. */
-fmi3Status fmi3ActivateModelPartition(fmi3Instance instance, fmi3ValueReference clockReference,
-                                      fmi3Float64 activationTime) {
+FMI3(fmi3Status, fmi3ActivateModelPartition)(fmi3Instance instance, fmi3ValueReference clockReference,
+                                             fmi3Float64 activationTime) {
     (void)clockReference;
     (void)activationTime;
     (void)component_forbids(instance, FMI3_CALL(fmi3ActivateModelPartition));

@@ -2,10 +2,15 @@
 #ifndef LAGFMU_FMI3_COMPONENT_H
 #define LAGFMU_FMI3_COMPONENT_H
 
-#include "adjoint.h"
 #include "component.h"
+#include "dependencies.h"
 #include "fmi3.h"
 #include "fmi3_calls.h"
+
+/* Of dvdot and dlambda in a sum of variables, and of b and c, by which it changes with these (fmi3_adjoint.c). */
+typedef struct {
+    double *vdot, *lambda, *b, *c; /* (nv), (m), (nv), (m) */
+} Weights;
 
 typedef struct {
     Component common; /* first, so that either is found from the other */
@@ -13,7 +18,8 @@ typedef struct {
     fmi3LogMessageCallback log;
     fmi3IntermediateUpdateCallback update;
     int early; /* 1: a step may return before its end */
-    Directions directions;
+    Weights stepped, full; /* in the coordinates that are stepped, and in all where these are others */
+    double *first, *column, *gradient, **member; /* b and c along a direction, which, derivatives; those of a group */
 } Component3;
 
 /* The groups of variables that there are; fmi3_values.c. */
@@ -23,8 +29,6 @@ SHARED const Group FLOAT64, CLOCK;
 SHARED Status component3_name(Component3 *made, const char *function, const fmi3ValueReference references[],
                               size_t count, Why *why);
 
-/* An array that an importer gives has as many values as it says, one a variable; 1: it has not, and the log says
- * so. */
-SHARED int component3_miscounts(Component *c, const Call *call, size_t values, size_t variables);
+SHARED void component3_layout(Component3 *made, Arena *arena); /* fmi3_adjoint.c */
 
 #endif

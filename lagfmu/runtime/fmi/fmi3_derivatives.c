@@ -3,10 +3,10 @@
 #include "dependencies.h"
 #include "fmi3_component.h"
 
-fmi3Status fmi3GetDirectionalDerivative(fmi3Instance instance, const fmi3ValueReference unknowns[],
-                                        size_t nUnknowns, const fmi3ValueReference knowns[], size_t nKnowns,
-                                        const fmi3Float64 seed[], size_t nSeed, fmi3Float64 sensitivity[],
-                                        size_t nSensitivity) {
+FMI3(fmi3Status, fmi3GetDirectionalDerivative)(fmi3Instance instance, const fmi3ValueReference unknowns[],
+                                               size_t nUnknowns, const fmi3ValueReference knowns[], size_t nKnowns,
+                                               const fmi3Float64 seed[], size_t nSeed, fmi3Float64 sensitivity[],
+                                               size_t nSensitivity) {
     const Call *call = FMI3_CALL(fmi3GetDirectionalDerivative);
     if (component_forbids(instance, call) || component3_miscounts(instance, call, nSeed, nKnowns) ||
         component3_miscounts(instance, call, nSensitivity, nUnknowns))
@@ -14,9 +14,9 @@ fmi3Status fmi3GetDirectionalDerivative(fmi3Instance instance, const fmi3ValueRe
     return component_directional(instance, call, &FLOAT64, unknowns, nUnknowns, knowns, nKnowns, seed, sensitivity);
 }
 
-fmi3Status fmi3GetOutputDerivatives(fmi3Instance instance, const fmi3ValueReference valueReferences[],
-                                    size_t nValueReferences, const fmi3Int32 orders[], fmi3Float64 values[],
-                                    size_t nValues) {
+FMI3(fmi3Status, fmi3GetOutputDerivatives)(fmi3Instance instance, const fmi3ValueReference valueReferences[],
+                                           size_t nValueReferences, const fmi3Int32 orders[], fmi3Float64 values[],
+                                           size_t nValues) {
     const Call *call = FMI3_CALL(fmi3GetOutputDerivatives);
     if (component_forbids(instance, call) || component3_miscounts(instance, call, nValues, nValueReferences))
         return fmi3Error;
@@ -43,8 +43,8 @@ static const unsigned *find_list(Component *c, const Call *call, fmi3ValueRefere
     return NULL;
 }
 
-fmi3Status fmi3GetNumberOfVariableDependencies(fmi3Instance instance, fmi3ValueReference valueReference,
-                                               size_t *nDependencies) {
+FMI3(fmi3Status, fmi3GetNumberOfVariableDependencies)(fmi3Instance instance, fmi3ValueReference valueReference,
+                                                      size_t *nDependencies) {
     const Call *call = FMI3_CALL(fmi3GetNumberOfVariableDependencies);
     if (component_forbids(instance, call)) return fmi3Error;
     if (nDependencies == NULL) return component_missing(instance, call);
@@ -54,10 +54,10 @@ fmi3Status fmi3GetNumberOfVariableDependencies(fmi3Instance instance, fmi3ValueR
     return fmi3OK;
 }
 
-fmi3Status fmi3GetVariableDependencies(fmi3Instance instance, fmi3ValueReference dependent,
-                                       size_t elementIndicesOfDependent[], fmi3ValueReference independents[],
-                                       size_t elementIndicesOfIndependents[], fmi3DependencyKind dependencyKinds[],
-                                       size_t nDependencies) {
+FMI3(fmi3Status, fmi3GetVariableDependencies)(fmi3Instance instance, fmi3ValueReference dependent,
+                                              size_t elementIndicesOfDependent[], fmi3ValueReference independents[],
+                                              size_t elementIndicesOfIndependents[],
+                                              fmi3DependencyKind dependencyKinds[], size_t nDependencies) {
     const Call *call = FMI3_CALL(fmi3GetVariableDependencies);
     Why text;
     if (component_forbids(instance, call)) return fmi3Error;

@@ -3,12 +3,12 @@
 #include "fmi3_component.h"
 #include "indicators.h"
 
-fmi3Status fmi3EnterContinuousTimeMode(fmi3Instance instance) {
+FMI3(fmi3Status, fmi3EnterContinuousTimeMode)(fmi3Instance instance) {
     return component_turn(instance, FMI3_CALL(fmi3EnterContinuousTimeMode), CONTINUOUS);
 }
 
-fmi3Status fmi3CompletedIntegratorStep(fmi3Instance instance, fmi3Boolean noSetFMUStatePriorToCurrentPoint,
-                                       fmi3Boolean *enterEventMode, fmi3Boolean *terminateSimulation) {
+FMI3(fmi3Status, fmi3CompletedIntegratorStep)(fmi3Instance instance, fmi3Boolean noSetFMUStatePriorToCurrentPoint,
+                                              fmi3Boolean *enterEventMode, fmi3Boolean *terminateSimulation) {
     const Call *call = FMI3_CALL(fmi3CompletedIntegratorStep);
     Component *c = instance;
     int event = 0;
@@ -21,34 +21,35 @@ fmi3Status fmi3CompletedIntegratorStep(fmi3Instance instance, fmi3Boolean noSetF
     return fmi3OK;
 }
 
-fmi3Status fmi3SetTime(fmi3Instance instance, fmi3Float64 time) {
+FMI3(fmi3Status, fmi3SetTime)(fmi3Instance instance, fmi3Float64 time) {
     return component_set_time(instance, FMI3_CALL(fmi3SetTime), time);
 }
 
-fmi3Status fmi3SetContinuousStates(fmi3Instance instance, const fmi3Float64 continuousStates[],
-                                   size_t nContinuousStates) {
+FMI3(fmi3Status, fmi3SetContinuousStates)(fmi3Instance instance, const fmi3Float64 continuousStates[],
+                                          size_t nContinuousStates) {
     return component_set_states(instance, FMI3_CALL(fmi3SetContinuousStates), continuousStates, nContinuousStates);
 }
 
-fmi3Status fmi3GetContinuousStateDerivatives(fmi3Instance instance, fmi3Float64 derivatives[],
-                                             size_t nContinuousStates) {
+FMI3(fmi3Status, fmi3GetContinuousStateDerivatives)(fmi3Instance instance, fmi3Float64 derivatives[],
+                                                    size_t nContinuousStates) {
     return component_read(instance, FMI3_CALL(fmi3GetContinuousStateDerivatives), exchange_derivatives, derivatives,
                           nContinuousStates, component_state_count());
 }
 
-fmi3Status fmi3GetEventIndicators(fmi3Instance instance, fmi3Float64 eventIndicators[], size_t nEventIndicators) {
+FMI3(fmi3Status, fmi3GetEventIndicators)(fmi3Instance instance, fmi3Float64 eventIndicators[],
+                                         size_t nEventIndicators) {
     return component_read(instance, FMI3_CALL(fmi3GetEventIndicators), exchange_indicators, eventIndicators,
                           nEventIndicators, indicators_count(MODEL_SYSTEM));
 }
 
-fmi3Status fmi3GetContinuousStates(fmi3Instance instance, fmi3Float64 continuousStates[],
-                                   size_t nContinuousStates) {
+FMI3(fmi3Status, fmi3GetContinuousStates)(fmi3Instance instance, fmi3Float64 continuousStates[],
+                                          size_t nContinuousStates) {
     return component_read(instance, FMI3_CALL(fmi3GetContinuousStates), exchange_get_states, continuousStates,
                           nContinuousStates, component_state_count());
 }
 
-fmi3Status fmi3GetNominalsOfContinuousStates(fmi3Instance instance, fmi3Float64 nominals[],
-                                             size_t nContinuousStates) {
+FMI3(fmi3Status, fmi3GetNominalsOfContinuousStates)(fmi3Instance instance, fmi3Float64 nominals[],
+                                                    size_t nContinuousStates) {
     return component_read(instance, FMI3_CALL(fmi3GetNominalsOfContinuousStates), exchange_nominals, nominals,
                           nContinuousStates, component_state_count());
 }
@@ -60,11 +61,11 @@ static fmi3Status tell_number(Component *c, const Call *call, int number, size_t
     return fmi3OK;
 }
 
-fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance instance, size_t *nEventIndicators) {
+FMI3(fmi3Status, fmi3GetNumberOfEventIndicators)(fmi3Instance instance, size_t *nEventIndicators) {
     return tell_number(instance, FMI3_CALL(fmi3GetNumberOfEventIndicators), indicators_count(MODEL_SYSTEM),
                 nEventIndicators);
 }
 
-fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance instance, size_t *nContinuousStates) {
+FMI3(fmi3Status, fmi3GetNumberOfContinuousStates)(fmi3Instance instance, size_t *nContinuousStates) {
     return tell_number(instance, FMI3_CALL(fmi3GetNumberOfContinuousStates), component_state_count(), nContinuousStates);
 }

@@ -5,19 +5,20 @@
 
 /* ------------------------------------------------------------------ Event Mode */
 
-fmi3Status fmi3EnterEventMode(fmi3Instance instance) {
+FMI3(fmi3Status, fmi3EnterEventMode)(fmi3Instance instance) {
     return component_enter_event(instance, FMI3_CALL(fmi3EnterEventMode));
 }
 
 /* They are evaluated as soon as they are asked for. */
-fmi3Status fmi3EvaluateDiscreteStates(fmi3Instance instance) {
+FMI3(fmi3Status, fmi3EvaluateDiscreteStates)(fmi3Instance instance) {
     return component_turn(instance, FMI3_CALL(fmi3EvaluateDiscreteStates), EVENT);
 }
 
-fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discreteStatesNeedUpdate,
-                                    fmi3Boolean *terminateSimulation, fmi3Boolean *nominalsOfContinuousStatesChanged,
-                                    fmi3Boolean *valuesOfContinuousStatesChanged, fmi3Boolean *nextEventTimeDefined,
-                                    fmi3Float64 *nextEventTime) {
+FMI3(fmi3Status, fmi3UpdateDiscreteStates)(fmi3Instance instance, fmi3Boolean *discreteStatesNeedUpdate,
+                                           fmi3Boolean *terminateSimulation,
+                                           fmi3Boolean *nominalsOfContinuousStatesChanged,
+                                           fmi3Boolean *valuesOfContinuousStatesChanged,
+                                           fmi3Boolean *nextEventTimeDefined, fmi3Float64 *nextEventTime) {
     const Call *call = FMI3_CALL(fmi3UpdateDiscreteStates);
     Component *c = instance;
     int moved = 0, again = 0;
@@ -36,14 +37,14 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discrete
 
 /* ------------------------------------------------------------------ Step Mode */
 
-fmi3Status fmi3EnterStepMode(fmi3Instance instance) {
+FMI3(fmi3Status, fmi3EnterStepMode)(fmi3Instance instance) {
     return component_turn(instance, FMI3_CALL(fmi3EnterStepMode), STEP_COMPLETE);
 }
 
-fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoint,
-                      fmi3Float64 communicationStepSize, fmi3Boolean noSetFMUStatePriorToCurrentPoint,
-                      fmi3Boolean *eventHandlingNeeded, fmi3Boolean *terminateSimulation, fmi3Boolean *earlyReturn,
-                      fmi3Float64 *lastSuccessfulTime) {
+FMI3(fmi3Status, fmi3DoStep)(fmi3Instance instance, fmi3Float64 currentCommunicationPoint,
+                             fmi3Float64 communicationStepSize, fmi3Boolean noSetFMUStatePriorToCurrentPoint,
+                             fmi3Boolean *eventHandlingNeeded, fmi3Boolean *terminateSimulation,
+                             fmi3Boolean *earlyReturn, fmi3Float64 *lastSuccessfulTime) {
     const Call *call = FMI3_CALL(fmi3DoStep);
     Component *c = instance;
     const double t = currentCommunicationPoint, h = communicationStepSize;
@@ -67,11 +68,7 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
 
 /* ------------------------------------------------------------------ beside the standard */
 
-#define lagfmu_batch FMI3_NAME(lagfmu_batch)
-
 /* What became of the runs stands in the batch; the instance is as new. */
-FMI3_EXPORT fmi3Status lagfmu_batch(fmi3Instance instance, Batch *batch);
-
-fmi3Status lagfmu_batch(fmi3Instance instance, Batch *batch) {
+FMI3(fmi3Status, lagfmu_batch)(fmi3Instance instance, Batch *batch) {
     return component_runs(instance, FMI3_CALL(lagfmu_batch), batch);
 }

@@ -30,50 +30,26 @@ static fmi3Status set(Component *c, const Call *call, const Group *group, const 
 }
 
 /* The functions of one type: fmi3GetTYPE, fmi3SetTYPE. */
-#define FMI3_ACCESS(Type, group)                                                                              \
-    fmi3Status fmi3Get##Type(fmi3Instance instance, const fmi3ValueReference valueReferences[],               \
-                             size_t nValueReferences, fmi3##Type values[], size_t nValues) {                  \
-        return get(instance, FMI3_CALL(fmi3Get##Type), group, valueReferences, nValueReferences, values,      \
-                   nValues);                                                                                  \
-    }                                                                                                         \
-    fmi3Status fmi3Set##Type(fmi3Instance instance, const fmi3ValueReference valueReferences[],               \
-                             size_t nValueReferences, const fmi3##Type values[], size_t nValues) {            \
-        return set(instance, FMI3_CALL(fmi3Set##Type), group, valueReferences, nValueReferences, values,      \
-                   nValues);                                                                                  \
+#define FMI3_ACCESS(Type, group)                                                                                      \
+    FMI3(fmi3Status, fmi3Get##Type)(fmi3Instance instance, const fmi3ValueReference valueReferences[],                \
+                                    size_t nValueReferences, fmi3##Type values[], size_t nValues) {                   \
+        return get(instance, FMI3_CALL(fmi3Get##Type), group, valueReferences, nValueReferences, values, nValues);    \
+    }                                                                                                                 \
+    FMI3(fmi3Status, fmi3Set##Type)(fmi3Instance instance, const fmi3ValueReference valueReferences[],                \
+                                    size_t nValueReferences, const fmi3##Type values[], size_t nValues) {             \
+        return set(instance, FMI3_CALL(fmi3Set##Type), group, valueReferences, nValueReferences, values, nValues);    \
     }
 
-/* What is in an array, behind how much that is; NULL of a scalar. */
-static const unsigned *array_at(fmi3ValueReference reference) {
-    const unsigned k = reference - (unsigned)VARIABLE_COUNT;
-    return reference >= (unsigned)VARIABLE_COUNT && k < (unsigned)ARRAY_COUNT ? list_at(ARRAY_LISTS[k]) : NULL;
-}
-
-/* Of an array all that is in it, in its place among the values. */
-fmi3Status fmi3GetFloat64(fmi3Instance instance, const fmi3ValueReference valueReferences[],
-                          size_t nValueReferences, fmi3Float64 values[], size_t nValues) {
+FMI3(fmi3Status, fmi3GetFloat64)(fmi3Instance instance, const fmi3ValueReference valueReferences[],
+                                 size_t nValueReferences, fmi3Float64 values[], size_t nValues) {
     const Call *call = FMI3_CALL(fmi3GetFloat64);
-    size_t expected = 0, at = 0;
-    int status = CALL_OK;
-    if (ARRAY_COUNT == 0 || nValueReferences == 0 || valueReferences == NULL || values == NULL)
+    if (ARRAYS == NULL || nValueReferences == 0 || valueReferences == NULL || values == NULL)
         return get(instance, call, &FLOAT64, valueReferences, nValueReferences, values, nValues);
-    for (size_t k = 0; k < nValueReferences; k++) {
-        const unsigned *array = array_at(valueReferences[k]);
-        expected += array == NULL ? 1 : *array;
-    }
-    if (component_forbids(instance, call) || component3_miscounts(instance, call, nValues, expected))
-        return fmi3Error;
-    for (size_t k = 0; k < nValueReferences && status == CALL_OK; k++) {
-        const unsigned *array = array_at(valueReferences[k]);
-        const unsigned *held = array == NULL ? &valueReferences[k] : array + 1;
-        const size_t count = array == NULL ? 1 : *array;
-        status = component_get(instance, call, &FLOAT64, held, count, values + at);
-        at += count;
-    }
-    return status;
+    return ARRAYS(instance, call, &FLOAT64, valueReferences, nValueReferences, values, nValues);
 }
 
-fmi3Status fmi3SetFloat64(fmi3Instance instance, const fmi3ValueReference valueReferences[],
-                          size_t nValueReferences, const fmi3Float64 values[], size_t nValues) {
+FMI3(fmi3Status, fmi3SetFloat64)(fmi3Instance instance, const fmi3ValueReference valueReferences[],
+                                 size_t nValueReferences, const fmi3Float64 values[], size_t nValues) {
     return set(instance, FMI3_CALL(fmi3SetFloat64), &FLOAT64, valueReferences, nValueReferences, values, nValues);
 }
 
@@ -94,15 +70,15 @@ FMI3_NO_ACCESS(String)
 
 static const Group BINARY = {"Binary", 0, AS_DOUBLE};
 
-fmi3Status fmi3GetBinary(fmi3Instance instance, const fmi3ValueReference valueReferences[],
-                         size_t nValueReferences, size_t valueSizes[], fmi3Binary values[], size_t nValues) {
+FMI3(fmi3Status, fmi3GetBinary)(fmi3Instance instance, const fmi3ValueReference valueReferences[],
+                                size_t nValueReferences, size_t valueSizes[], fmi3Binary values[], size_t nValues) {
     (void)valueSizes;
     return get(instance, FMI3_CALL(fmi3GetBinary), &BINARY, valueReferences, nValueReferences, values, nValues);
 }
 
-fmi3Status fmi3SetBinary(fmi3Instance instance, const fmi3ValueReference valueReferences[],
-                         size_t nValueReferences, const size_t valueSizes[], const fmi3Binary values[],
-                         size_t nValues) {
+FMI3(fmi3Status, fmi3SetBinary)(fmi3Instance instance, const fmi3ValueReference valueReferences[],
+                                size_t nValueReferences, const size_t valueSizes[], const fmi3Binary values[],
+                                size_t nValues) {
     (void)valueSizes;
     return set(instance, FMI3_CALL(fmi3SetBinary), &BINARY, valueReferences, nValueReferences, values, nValues);
 }

@@ -24,27 +24,38 @@ Status instance_factor(Instance *x) {
     return mechanism_motion(&s->full, *at, x->seen.q, x->seen.v, s->active_full);
 }
 
-Status instance_differentiate_factored(Instance *x, Direction d) {
+void instance_change_outputs(Instance *x, Direction d) {
+    Solver *s = &x->solver;
+    const System *full = s->system->full;
+    Sensitivity *w = &x->along;
+    if (full == NULL) {
+        outputs_change(&s->sensitivity, &s->stepped, s->system, x->at, &x->seen, d);
+        return;
+    }
+    const Direction wide = {d.dt, w->dq, w->dv, d.du, d.dp};
+    outputs_change(w, full->dynamics != NULL ? &s->full : NULL, full, x->at, &x->seen, wide);
+}
+
+Status instance_differentiate_by(Instance *x, Direction d, Differentiate solve) {
     Solver *s = &x->solver;
     const Instant at = x->at;
     const System *full = s->system->full;
-    if (sensitivity_along(&s->sensitivity, &s->stepped, at, s->state.q, s->state.v, d) != OK) return FAILED;
-    if (full == NULL) {
-        outputs_change(&s->sensitivity, &s->stepped, s->system, at, &x->seen, d);
-        return OK;
-    }
     Sensitivity *w = &x->along;
-    s->system->embed_tangent(at.t, s->state.q, s->state.v, at.u, at.p, d.dt, d.dq, d.dv, d.du,
-                             d.dp, w->dq, w->dv);
-    const Direction wide = {d.dt, w->dq, w->dv, d.du, d.dp};
-    if (full->dynamics == NULL) {
-        sensitivity_of_values(w, full, at, x->seen.q, x->seen.v, wide);
-        outputs_change(w, NULL, full, at, &x->seen, wide);
-        return OK;
+    if (solve(&s->sensitivity, &s->stepped, at, s->state.q, s->state.v, d) != OK) return FAILED;
+    if (full != NULL) {
+        s->system->embed_tangent(at.t, s->state.q, s->state.v, at.u, at.p, d.dt, d.dq, d.dv, d.du, d.dp, w->dq, w->dv);
+        const Direction wide = {d.dt, w->dq, w->dv, d.du, d.dp};
+        if (full->dynamics == NULL)
+            sensitivity_of_values(w, full, at, x->seen.q, x->seen.v, wide);
+        else if (solve(w, &s->full, at, x->seen.q, x->seen.v, wide) != OK)
+            return FAILED;
     }
-    if (sensitivity_along(w, &s->full, at, x->seen.q, x->seen.v, wide) != OK) return FAILED;
-    outputs_change(w, &s->full, full, at, &x->seen, wide);
+    instance_change_outputs(x, d);
     return OK;
+}
+
+Status instance_differentiate_factored(Instance *x, Direction d) {
+    return instance_differentiate_by(x, d, sensitivity_along);
 }
 
 Status instance_differentiate(Instance *x, Direction d) {

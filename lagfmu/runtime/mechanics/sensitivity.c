@@ -68,7 +68,7 @@ static void right_sides(Sensitivity *w, const Mechanism *b) {
     }
 }
 
-static void find_sides(Sensitivity *w, Mechanism *b, Instant at, const double *q, const double *v, Direction d) {
+void sensitivity_sides(Sensitivity *w, Mechanism *b, Instant at, const double *q, const double *v, Direction d) {
     const System *s = b->system;
     s->tangent(at.t, q, v, at.u, at.p, d.dt, d.dq, d.dv, d.du, d.dp, w->dM, w->dF, w->dG, w->dnu,
                w->dgamma, w->df, w->denergy);
@@ -96,7 +96,7 @@ static Status check_sides(const Sensitivity *w, const Mechanism *b, Instant at) 
 Status sensitivity_along(Sensitivity *w, Mechanism *b, Instant at, const double *q,
                          const double *v, Direction d) {
     const System *s = b->system;
-    find_sides(w, b, at, q, v, d);
+    sensitivity_sides(w, b, at, q, v, d);
     const Status solved = w->slide != NULL
                               ? w->slide(w, b, at, q, v, d)
                               : linear_solve(&b->linear, w->b, w->c, w->dvdot, b->given != NULL ? NULL : w->dlambda);

@@ -38,6 +38,10 @@ SHARED void sensitivity_layout(Sensitivity *w, Arena *arena, const System *s);
 SHARED Status sensitivity_along(Sensitivity *w, Mechanism *b, Instant at, const double *q,
                                 const double *v, Direction d);
 
+/* The right sides b and c alone. */
+SHARED void sensitivity_sides(Sensitivity *w, Mechanism *b, Instant at, const double *q, const double *v,
+                              Direction d);
+
 /* sliding_along.c: the same with frictions that slip or stick as they do there, from b and c. */
 SHARED Status sliding_along(Sensitivity *w, Mechanism *b, Instant at, const double *q, const double *v, Direction d);
 
