@@ -14,10 +14,12 @@ from typing import Any
 import fmpy
 import numpy as np
 import pytest
+import runs
 from conftest import FILES, MODELS, Fmu, of_each_kind
 from fmpy.build import build_platform_binary
 from fmpy.fmi1 import FMICallException
 from fmpy.validation import validate_fmu
+from runtime import RUNTIME_FILES, compiler
 from typer.testing import CliRunner
 
 import lagfmu
@@ -166,6 +168,16 @@ def test_verify_holds_its_closed_forms(fmi3_fmu: Fmu) -> None:
     found = lagfmu.verify(fmi3_fmu("Hemisphere"))
     assert found.passed
     assert found.closed_forms > 3
+
+
+def test_its_functions_are_defined_as_the_standard_declares_them(fmi3_fmu: Fmu) -> None:
+    """A compiler that sees both, tests/fmi3_functions.h and the sources, finds no difference."""
+    folder, _ = runs.unpacked(fmi3_fmu("Hemisphere"))
+    declared = Path(__file__).parent / "fmi3_functions.h"
+    flags = ("-std=c99", "-fsyntax-only", f"-I{RUNTIME_FILES['fmi3.h'].parent}", "-include")
+    command = [compiler(), *flags, str(declared), str(Path(folder, "sources", "all.c"))]
+    run = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    assert run.returncode == 0, run.stderr[-2000:]
 
 
 @pytest.mark.thorough
