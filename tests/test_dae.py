@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from ctypes import byref, c_bool, c_double, c_size_t, c_void_p
+from pathlib import Path
 
 import fmpy
 import numpy as np
@@ -12,6 +13,7 @@ import redundant
 from dae import MANIFEST, NAMESPACE, Importer, Manifest, solve
 from fmpy.validation import validate_fmu
 from linkages import FOUR_BAR, rods
+from lxml import etree
 from sympy import sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 from test_forged_states import HEAD, forged
@@ -135,6 +137,17 @@ def test_the_manifest_is_as_the_draft_describes_it(path):
     ]
     kinds = {e.tag.removeprefix(NAMESPACE) for e in found.root[1]}
     assert kinds == {"Output", "ContinuousStateDerivative", "InitialUnknown", "Residual"}
+
+
+def test_the_manifest_fits_a_schema_of_the_drafts_text(path):
+    """fmi_ls_dae.xsd, which refuses a residual without a formulation."""
+    schema = etree.XMLSchema(etree.parse(Path(__file__).parent / "fmi_ls_dae.xsd"))
+    for model in (pendulum, sleigh, four_bar):
+        schema.assertValid(etree.fromstring(Manifest(path(model)).text))
+    root = etree.fromstring(Manifest(path(pendulum)).text)
+    residual = root.find(f".//{NAMESPACE}Residual")
+    residual.clear()
+    assert not schema.validate(root)
 
 
 def test_a_constraint_on_velocities_is_of_index_2(path):
