@@ -23,17 +23,20 @@ static const unsigned INITIALLY[] = {{
 static const unsigned RUNNING[] = {{
 {running}
 }};
-static const unsigned HOLDING[] = {{
-{arrays}
-}};
 
 SHARED_VALUE const unsigned *const LISTS = HELD;
 SHARED_VALUE const unsigned *const INITIAL_LISTS = INITIALLY;
 SHARED_VALUE const unsigned *const RUNNING_LISTS = RUNNING;
 SHARED_VALUE const int DEPENDENCIES_TOLD = {told};
-SHARED_VALUE const unsigned *const ARRAY_LISTS = HOLDING;
-SHARED_VALUE const int ARRAY_COUNT = {array_count};
 SHARED_VALUE GetArrays *const ARRAYS = {getter};
+"""
+ARRAYS = """
+static const unsigned HOLDING[] = {{
+{arrays}
+}};
+
+SHARED_VALUE const unsigned *const ARRAY_LISTS = HOLDING;
+SHARED_VALUE const int ARRAY_COUNT = {count};
 """
 
 
@@ -56,16 +59,15 @@ def interface_source(
     ]
     held = [_number(on, number) for on in arrays.values()]
     lists = [_lines([len(on), *on]) for on in number]
-    return HEAD.format(
+    text = HEAD.format(
         name=name,
         lists=",\n".join(lists) or "    0",
         initially=_lines(unknowns[0]),
         running=_lines(unknowns[1]),
-        arrays=_lines(held or [0]),
-        array_count=len(held),
         getter="get_arrays" if held else "NULL",
         told=int(told),
     )
+    return text + ARRAYS.format(arrays=_lines(held), count=len(held)) if held else text
 
 
 def _number(on: Sequence[int] | None, number: dict[tuple[int, ...], int]) -> int:

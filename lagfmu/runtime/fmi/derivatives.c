@@ -115,7 +115,7 @@ static Status differentiate_along(Instance *x, int c, Direction *d) {
     *d = (Direction){0, column, column + s->system->nq, w->du, w->dp};
     memset(w->du, 0, (size_t)s->system->inputs * sizeof *w->du);
     if (parameter >= 0) w->dp[parameter] = 1;
-    const Status status = instance_differentiate_factored(x, *d);
+    const Status status = instance_differentiate_factored(x, *d, sensitivity_along);
     if (parameter >= 0) w->dp[parameter] = 0;
     return status;
 }

@@ -32,8 +32,6 @@
 #define fmi3Version "3.0"
 #define fmi3True true
 #define fmi3False false
-#define fmi3ClockActive true
-#define fmi3ClockInactive false
 
 typedef void *fmi3Instance;
 typedef void *fmi3InstanceEnvironment;

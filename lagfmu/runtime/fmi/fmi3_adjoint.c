@@ -3,10 +3,10 @@
  *   M dvdot = b + G^T dlambda ,  G dvdot = c                                                   (sensitivity.c)
  *   M x + G^T mu = a ,  -G x = l   with the weights a of dvdot and l of dlambda in the sum
  *
- * Along a direction the sum changes by  x . b + mu . c  and by what does not pass through dvdot and dlambda (Griewank &
- * Walther, Evaluating Derivatives, 2008, ch. 3).  Where nothing is beside them, the directions of a group of columns, of
- * which none changes what another does, are taken at once: along  1  each part of b and c is one derivative, and along
- * 2^k , k = 0, 1, ... within the group, the same times 2^k without rounding, which tells k. */
+ * Along a direction the sum changes by  x . b + mu . c  and by what is beside dvdot and dlambda (Griewank & Walther,
+ * Evaluating Derivatives, 2008, ch. 3).  Where nothing is, the columns of a group, of which none changes what another
+ * does, are taken at once: along  1  each part of b and c is one derivative, along 2^k, k = 0, 1, ... within the group,
+ * the same times 2^k without rounding, which tells k. */
 #include <math.h>
 #include <string.h>
 
@@ -105,7 +105,7 @@ static Status change_along(Component3 *c, const Sum *sum, Direction d, double *c
     Solver *s = &x->solver;
     const System *full = s->system->full;
     component_settle(&c->common, d.dt);
-    if (instance_differentiate_by(x, d, find_sides) != OK) return FAILED;
+    if (instance_differentiate_factored(x, d, find_sides) != OK) return FAILED;
     *change = find_change(sum, d) + weigh_sides(&c->stepped, &s->sensitivity, s->system);
     if (full != NULL && full->dynamics != NULL) *change += weigh_sides(&c->full, &x->along, full);
     return OK;
@@ -187,14 +187,14 @@ static int check_unknowns(Component *c, const Call *call, const fmi3ValueReferen
     return CALL_OK;
 }
 
-/* What has no derivative has none along any direction; and the transposed solves.  `undefined`, or NULL for another cause. */
+/* What has no derivative (`undefined`) has none along any direction; and the transposed solves. */
 static Status prepare_sum(Component3 *c, const Sum *sum, const Variable **undefined) {
     Instance *x = sum->x;
     Solver *s = &x->solver;
     const System *full = s->system->full;
     const Direction none = component_no_direction(&c->common);
     double change;
-    if (instance_factor(x) != OK || instance_differentiate_by(x, none, find_sides) != OK) return FAILED;
+    if (instance_factor(x) != OK || instance_differentiate_factored(x, none, find_sides) != OK) return FAILED;
     for (size_t k = 0; k < sum->count; k++) {
         if (instance_change(x, &VARIABLES[sum->unknowns[k]], none, &change) == OK) continue;
         *undefined = &VARIABLES[sum->unknowns[k]];

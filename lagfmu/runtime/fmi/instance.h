@@ -148,13 +148,8 @@ SHARED Status instance_differentiate(Instance *x, Direction d);
 
 /* The same in two: what all directions at this state need, once, and then along as many as there are. */
 SHARED Status instance_factor(Instance *x);
-SHARED Status instance_differentiate_factored(Instance *x, Direction d);
-
-/* The same where `solve` says how accelerations and multipliers change; then the model's own outputs alone. */
-typedef Status (*Differentiate)(Sensitivity *w, Mechanism *b, Instant at, const double *q, const double *v,
-                                Direction d);
-SHARED Status instance_differentiate_by(Instance *x, Direction d, Differentiate solve);
-SHARED void instance_change_outputs(Instance *x, Direction d);
+SHARED Status instance_differentiate_factored(Instance *x, Direction d, Differentiate *solve);
+SHARED void instance_change_outputs(Instance *x, Direction d); /* of these the model's own alone */
 
 SHARED Status instance_change(const Instance *x, const Variable *v, Direction d, double *change);
 

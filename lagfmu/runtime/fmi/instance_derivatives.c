@@ -36,7 +36,7 @@ void instance_change_outputs(Instance *x, Direction d) {
     outputs_change(w, full->dynamics != NULL ? &s->full : NULL, full, x->at, &x->seen, wide);
 }
 
-Status instance_differentiate_by(Instance *x, Direction d, Differentiate solve) {
+Status instance_differentiate_factored(Instance *x, Direction d, Differentiate *solve) {
     Solver *s = &x->solver;
     const Instant at = x->at;
     const System *full = s->system->full;
@@ -54,12 +54,8 @@ Status instance_differentiate_by(Instance *x, Direction d, Differentiate solve) 
     return OK;
 }
 
-Status instance_differentiate_factored(Instance *x, Direction d) {
-    return instance_differentiate_by(x, d, sensitivity_along);
-}
-
 Status instance_differentiate(Instance *x, Direction d) {
-    return instance_factor(x) == OK ? instance_differentiate_factored(x, d) : FAILED;
+    return instance_factor(x) == OK ? instance_differentiate_factored(x, d, sensitivity_along) : FAILED;
 }
 
 Status instance_change(const Instance *x, const Variable *v, Direction d, double *change) {

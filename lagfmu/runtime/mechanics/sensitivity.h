@@ -35,15 +35,15 @@ SHARED void sensitivity_layout(Sensitivity *w, Arena *arena, const System *s);
 
 /* Changes along a direction of everything that `mechanism_motion` found at (at, q, v), which must be
  * the latest that was done with `b`. */
-SHARED Status sensitivity_along(Sensitivity *w, Mechanism *b, Instant at, const double *q,
-                                const double *v, Direction d);
+typedef Status Differentiate(Sensitivity *w, Mechanism *b, Instant at, const double *q, const double *v, Direction d);
+SHARED Differentiate sensitivity_along;
 
 /* The right sides b and c alone. */
 SHARED void sensitivity_sides(Sensitivity *w, Mechanism *b, Instant at, const double *q, const double *v,
                               Direction d);
 
 /* sliding_along.c: the same with frictions that slip or stick as they do there, from b and c. */
-SHARED Status sliding_along(Sensitivity *w, Mechanism *b, Instant at, const double *q, const double *v, Direction d);
+SHARED Differentiate sliding_along;
 
 /* Changes of M, F, G, nu, gamma, f and the energies along a direction; nothing is solved. */
 SHARED void sensitivity_of_values(Sensitivity *w, const System *s, Instant at, const double *q,
