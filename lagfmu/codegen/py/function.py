@@ -28,6 +28,7 @@ ARGUMENTS = (
 )
 
 TABLE = "table_of_"
+MOST_TERMS = 500  # of a sum: Python's compiler goes as deep as there are terms, and refuses 3,000
 
 
 class Printer(PythonCodePrinter):  # type: ignore[misc]
@@ -48,6 +49,13 @@ class Printer(PythonCodePrinter):  # type: ignore[misc]
     def _print_SplineBase(self, call: Expr) -> str:
         order = f", {call.order}" if call.order else ""
         return f"{table_name(call.spline)}({self._print(call.args[0])}{order})"
+
+    def _print_Add(self, total: Expr, order: str | None = None) -> str:
+        terms = total.args
+        if len(terms) <= MOST_TERMS:
+            return str(super()._print_Add(total, order))
+        parts = (terms[k : k + MOST_TERMS] for k in range(0, len(terms), MOST_TERMS))
+        return " + ".join(f"({self._print(sp.Add(*part, evaluate=False))})" for part in parts)
 
     def _print_Integer(self, number: Expr) -> str:
         return str(number) if abs(int(number)) < 2**53 else repr(float(number))
