@@ -58,6 +58,7 @@ def test_the_exit_code_is_the_worst_of_all(hemisphere, wrong, tmp_path):
     assert run("verify", hemisphere)[0] == 0
     assert run("verify", hemisphere, wrong)[0] == 1
     code, text = run("verify", missing, wrong, hemisphere)
+    assert "3 FMUs: 1 pass, 1 fail, 1 not run" in text
     assert code == 3
     assert "there is no such file" in text
     assert "Hemisphere: pass" in text

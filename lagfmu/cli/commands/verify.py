@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from ...errors import LagfmuError, SimulationError, UsageError
 from .. import options
 from ..terminal import plainly, say, say_wrote
+
+if TYPE_CHECKING:
+    from ...verification.junit import Report
 
 
 def verify(
@@ -81,7 +84,14 @@ def verify(
             page = verified([(r.file, r.found, r.error) for r in done])
             write_whole(html, page.encode())
             say_wrote(html)
+        if len(done) > 1:
+            passed, ran = (sum(map(test, done)) for test in (_passed, lambda r: not r.error))
+            say(f"{len(done)} FMUs: {passed} pass, {ran - passed} fail, {len(done) - ran} not run")
         finish("verify", done, json, junit)
+
+
+def _passed(one: Report) -> bool:
+    return not one.error and one.found.passed
 
 
 def _units(fmus: Sequence[Path]) -> dict[str, str | None]:
