@@ -27,17 +27,19 @@ def simulated(*words: object) -> dict[str, list[str]]:
 
 
 def test_an_equation_is_broken_before_its_operators() -> None:
-    """No word is lost or cut; a line begins with = + or - wherever what lies between two of them fits."""
+    """No word is lost or cut; a line begins with = + or -, inside of brackets only where it has to, and then
+    further to the right."""
     text = "m x'' + c x' = 2 (x1 - x2) lambda_1 + (a + b + c + d + e + f + g + h + i) lambda_2"
     for width in (20, 30, 44, 60, 100):
         lines = wrapped(text, width)
         assert " ".join(line.strip() for line in lines) == text
         assert max(map(len, lines)) <= width
     assert wrapped(text, 44) == [
-        "m x'' + c x' = 2 (x1 - x2) lambda_1 + (a + b",
-        "+ c + d + e + f + g + h + i) lambda_2",
+        "m x'' + c x' = 2 (x1 - x2) lambda_1",
+        "+ (a + b + c + d + e + f + g + h + i)",
+        "lambda_2",
     ]
-    assert wrapped("a force of (2 m r theta' r') = b", 10)[-1] == "= b"
+    assert wrapped(text, 30)[-2:] == ["+ (a + b + c + d + e + f + g", "  + h + i) lambda_2"]
     assert wrapped("", 10) == [""]
     # one word longer than a line is left to the terminal
     assert wrapped("a" * 20, 10) == ["a" * 20]

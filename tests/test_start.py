@@ -130,9 +130,20 @@ def test_a_value_that_is_the_described_one_is_not_set(rod):
     """Importers write all start values back: theta = 0.3 set to what is described stays a given value."""
     at, _ = begun(rod, theta=0.3, x=0.6)
     assert at["x"] == 0.6
-    at, told = begun(rod, theta=0.5, x=0.0)
-    assert at["theta"] == 0.5
-    assert all(t.startswith("start values that were left out") for t in told)
+    described = {"theta": 0.5, "x": 0.0, "der(x)": 0.0}
+    run = simulate_fmu(str(rod), stop_time=1e-3, start_values=described, output=["theta", "x"])
+    assert run["theta"][0] == 0.5
+    assert run["x"][0] == pytest.approx(HALF * np.cos(0.5), rel=1e-15)
+
+
+def test_a_zero_that_a_user_asks_for_is_meant(rod):
+    """theta' = 1.86 rad/s is given and nothing is said of y': y' = 0, though that is also what an omitted
+    value is described as, stays, and the rod rests."""
+    at, told = begun(rod, y_dot=0.0)
+    assert (at["der(y)"], at["der(theta)"]) == pytest.approx((0.0, 0.0), abs=1e-15)
+    runs = sweep(rod, {"der(y)": [0.0]}, keep=["der(theta):max"], stop_time=1e-6)
+    assert abs(runs["der(theta):max"][0]) < 1e-4
+    assert any("start value der(theta) = 1.86 misses" in t for t in told)
 
 
 def test_changed_parameters_move_omitted_values_first(rod):

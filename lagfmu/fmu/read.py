@@ -127,6 +127,7 @@ def _rule(v: Any) -> Rule:
         None if v.max is None else float(v.max),
         items={item.name: int(item.value) for item in items},
         start=float(v.start) if kind_of(v) == "Real" and v.start is not None else None,
+        begins=v.causality not in ("parameter", "input") and v.initial in ("exact", "approx"),
         follows=(v.description or "").endswith(names.FOLLOWS),
     )
 

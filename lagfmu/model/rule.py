@@ -25,7 +25,8 @@ class Rule:
     """What one variable may be set to, in SI units.
 
     `kind` as FMI names it; `positive`: zero makes no sense either; `items` are the numbers of an Enumeration
-    by name; `start` is what is described, and `follows`: it comes from an expression of parameters.
+    by name; `start` is what is described, `follows`: it comes from an expression of parameters,
+    and `begins`: it is a start value.
     """
 
     name: str
@@ -37,6 +38,7 @@ class Rule:
     items: Mapping[str, int] = field(default_factory=dict)
     start: float | None = None
     follows: bool = False
+    begins: bool = False
 
     def problem(self, value: Any) -> str:
         """What is wrong with a value of it; empty if nothing is."""
@@ -79,9 +81,12 @@ class Rule:
         """The same of a value that a user asked for by name, which is meant even if it is the described one.
 
         A start that follows from parameters goes before it if it differs from the description: the described
-        value is handed over one unit in the last place off.
+        value is handed over one unit in the last place off.  A start of 0 is handed over as -0, since the
+        described 0 may be one that nobody gave.
         """
         found = self.number(value)
+        if self.begins and found == self.start == 0:
+            return -0.0
         return math.nextafter(found, math.inf) if self.follows and found == self.start else found
 
 

@@ -252,7 +252,11 @@ class Instance:
         for j, name in enumerate(states):
             k = self.reference[name]
             value, described = self.values[k], self.variables[k]
-            said = SET if value != described.start else GIVEN if described.given else OMITTED
+            zero_meant = (
+                value == 0 and math.copysign(1.0, value) < 0
+            )  # -0: as Rule.asked hands it over
+            meant = value != described.start or zero_meant
+            said = SET if meant else GIVEN if described.given else OMITTED
             if said != SET and j in formulas:
                 value = formulas[j]
                 if not math.isfinite(value):
@@ -260,7 +264,7 @@ class Instance:
                         f"the start value of {name} is an expression of parameters, which has no finite "
                         "value at those that are set: set other parameters, or this start"
                     )
-            y.append(value)
+            y.append(value + 0.0)
             priority.append(said)
         return y, priority
 

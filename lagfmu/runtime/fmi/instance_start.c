@@ -49,13 +49,15 @@ static void tell_left_out(const Telling *told) {
     x->tell(x->context, NOTE_EVENT, x->note);
 }
 
-/* A start value that differs from the described one was set, whatever calls set it. */
+/* A start value that differs from the described one was set, whatever calls set it; so was a
+ * 0 that is handed over as -0, where 0 is described. */
 static void find_priorities(Instance *x) {
     for (int j = 0; j < system_starts(x->solver.system); j++) x->priority[j] = OMITTED;
     for (int k = 0; k < VARIABLE_COUNT; k++) {
         const Variable *v = &VARIABLES[k];
         if (v->role != ROLE_START) continue;
-        const int set = instance_setting(x, v) != v->start;
+        const double value = instance_setting(x, v);
+        const int set = value != v->start || (value == 0 && signbit(value));
         x->priority[v->state] = set ? SET : v->given ? GIVEN : OMITTED;
     }
 }
@@ -66,6 +68,7 @@ static Status find_begin(Instance *x) {
     const System *system = s->system;
     state_gather(system, x->q0, x->v0, x->begin);
     memcpy(x->begin + system_states(system), x->joint0, (size_t)(2 * system->joint_count) * sizeof *x->begin);
+    for (int j = 0; j < system_states(system); j++) x->begin[j] += 0; /* no -0 */
     if (system->started_count > 0) system->starts(s->p, x->formula);
     for (int i = 0; i < system->started_count; i++) {
         const int j = system->started[i];

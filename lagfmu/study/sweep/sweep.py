@@ -360,7 +360,8 @@ def _check(varied: Design, rules: Mapping[str, Rule], driven: Collection[str]) -
 
 def _asked(rule: Rule, column: NDArray[np.float64]) -> NDArray[np.float64]:
     """Values that vary as the FMU gets them."""
-    return np.array([rule.asked(x) for x in column]) if rule.follows else column
+    meant = rule.follows or rule.begins
+    return np.array([rule.asked(x) for x in column]) if meant else column
 
 
 def _save(found: Any, out: Path) -> None:
