@@ -29,6 +29,8 @@ from lagfmu import (
     norm,
     simulate,
 )
+from lagfmu.bodies import Body, Force, Gravity, Prismatic, Revolute, mechanism
+from lagfmu.bodies import Ground as Base
 from lagfmu.errors import LagfmuError, ModelError, SimulationError
 from lagfmu.testing import StartMovedWarning, find_compiler
 
@@ -491,3 +493,49 @@ def test_joints_that_would_load_each_other_are_refused_by_name(crank: Path) -> N
         SimulationError, match=r"'A', 'B', 'C'.*cannot be shown unique.*spectral radius"
     ):
         simulate(crank, start_values={"r": 0.1, "mu": 1.0}, stop_time=0.1, step_size=0.01)
+
+
+@pytest.mark.parametrize(("arm", "share"), [(0.15, 0.4), (0.3, 0.0)])
+def test_a_drawer_jams_where_it_is_pushed_too_far_from_its_guide(arm: float, share: float) -> None:
+    """A sleeve of length b on a rod is pushed by P at a distance h: each edge carries P h/b, so that
+    m a = P (1 - 2 mu h/b); from h = b/(2 mu) on no push moves it."""
+    sleeve = Body("sleeve", mass=2.0, inertia=0.01)
+    guide = Prismatic("D", Base().at((0, 0)), sleeve.at((0, 0)), axis="x", friction=0.2, length=0.1)
+    push = Force("push", sleeve.at((0, arm)), (6.0, 0))
+    model = mechanism("Drawer", plane="xy", bodies=[sleeve], joints=[guide], loads=[push])
+    run = simulate(model, 1.0, 0.5, 1e-10)
+    assert run["position.D"][-1] == pytest.approx(3.0 * share / 2, rel=1e-9, abs=1e-15)
+    assert run["sticks.D"][-1] == (share == 0)
+    assert run["power.D"][-1] == pytest.approx(
+        -6.0 * (1 - share) * 3.0 * share, rel=1e-9, abs=1e-15
+    )
+
+
+@pytest.mark.parametrize(
+    ("down", "load"), [((0, -g, 0), 6.0), ((0, 0, -g), 1.0), ((0, -g * 0.6, -g * 0.8), 4.4)]
+)
+def test_an_overhung_wheel_is_braked_by_the_edges_of_its_bearing_and_by_its_shoulder(
+    down: tuple[float, float, float], load: float
+) -> None:
+    """The weight W of a wheel hangs c = 3 b beside the middle of a bearing: its edges carry 3.5 W and
+    2.5 W, and a shoulder what pulls along the axis; J w' = -mu r (the sum of them)."""
+    wheel = Body("wheel", mass=2.0, inertia=(0.01, 0.01, 0.02))
+    pin = {"friction": 0.2, "radius": 0.01, "length": 0.1}
+    joint = Revolute("A", Base().at((0, 0, 0)), wheel.at((0, 0, -0.3)), **pin)
+    start = {"der(angle.A)": 5.0}
+    model = mechanism("Wheel", bodies=[wheel], joints=[joint], loads=[Gravity(down)], start=start)
+    run = simulate(model, 0.2, 0.1, 1e-10)
+    slowing = 0.2 * 0.01 * load * 2.0 * g / 0.02
+    assert run["der(angle.A)"] == pytest.approx(5.0 - slowing * run["time"], rel=1e-10)
+
+
+def test_a_length_without_a_moment_to_take_is_refused() -> None:
+    """In the plane a pin takes no moment; without friction no bearing is asked for."""
+    crank = Body("crank", mass=1.0, inertia=0.1)
+    places = Base().at((0, 0)), crank.at((0.1, 0))
+    for told, given in (
+        ("takes no moment", {"friction": 0.2, "radius": 0.01, "length": 0.1}),
+        ("no friction: give friction", {"length": 0.1}),
+    ):
+        with pytest.raises(ModelError, match=told):
+            mechanism("Pin", plane="xy", bodies=[crank], joints=[Revolute("A", *places, **given)])

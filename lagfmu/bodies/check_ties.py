@@ -11,7 +11,7 @@ from ..model.elements import Parameter, is_number
 from ..model.picture import Track
 from ..model.spline import Spline
 from .curves import PointOnCurve
-from .joints import Gear, Joint, Universal, name_of_joint
+from .joints import Gear, Joint, Planar, Universal, name_of_joint
 from .loads import Motor, Torsion
 from .vectors import AXES
 
@@ -50,10 +50,16 @@ def _of_joint(joint: Joint, planar: bool) -> Iterator[str]:
         yield (
             f"{what}: axis is {joint.axis!r}, expected {' or '.join(map(repr, possible)) or 'none'} {where}"
         )
-    if joint.friction is not None and not joint.measures:
+    if joint.friction is not None and isinstance(joint, Planar):
+        yield f"{what}: friction is given, but no force across its axis could press: rub a Contact instead"
+    elif joint.friction is not None and not joint.measures:
         yield f"{what}: friction is given, but it leaves no motion that could rub: leave it out"
     elif joint.friction is not None and joint.turns and not value_of(joint.radius):
         yield f"{what}: friction is given without the radius of the pin, expected radius=... in m"
+    if joint.length is not None and joint.friction is None:
+        yield f"{what}: the length of its bearing is given, but no friction: give friction, or leave it out"
+    elif joint.length is not None and (isinstance(joint, Planar) or (planar and joint.turns)):
+        yield f"{what}: length is given, but its bearing takes no moment: leave it out"
     limits = joint.limits
     if limits is None:
         if not is_number(joint.restitution) or float(joint.restitution):  # type: ignore[arg-type]

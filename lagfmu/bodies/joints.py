@@ -45,7 +45,8 @@ class Joint:
     `axis` is that of the first marker about which it turns or along which it slides; `limits` are the
     smallest and the largest angle [rad] or position [m], where it strikes and, with Newton's `restitution`,
     rebounds.  `friction` (a coefficient, or the static and the kinetic one) rubs with the norm of the two
-    radial components of its force; a joint that turns needs the `radius` [m] of its pin for it.
+    radial components of its force; a joint that turns needs the `radius` [m] of its pin for it.  With the
+    `length` [m] of its bearing, whose middle is the second marker, moments and thrust rub too.
     """
 
     name: str
@@ -55,6 +56,7 @@ class Joint:
     limits: Sequence[Number] | None = None
     friction: Number | tuple[Number, Number] | None = None
     radius: Number = 0.0
+    length: Number | None = None
     restitution: Number = 0.0
 
     usual: ClassVar[tuple[str, str]] = ("z", "z")  # axis in the plane, and in space
@@ -142,8 +144,7 @@ class Joint:
     def rub(self, draft: Draft, axis: int, wrench: Wrench) -> None:
         """Coulomb's law for the motion that it leaves free: |torque| <= mu r N, |force| <= mu N, of a
         cylindrical joint for the vector (v, r w); N is the norm of the force across the axis."""
-        across = [x for x in draft.components if x != AXES[axis]]
-        normal = norm(*(multiplier(f"{self.name}.{x}") for x in across))
+        normal = self.normal(draft, axis)
         coefficients = draft.coefficients(self.friction, self.name)
         r = draft.number(
             self.radius, f"{self.name}.radius", "m", f"radius of the pin of {self.name}"
@@ -160,6 +161,28 @@ class Joint:
         if len(rows) == 1 and self.turns:
             normal *= r
         draft.constraints.append(Friction(self.name, rows, normal, *coefficients))
+
+    def normal(self, draft: Draft, axis: int) -> Expr:
+        """N [N]: of a bearing of length b the sum over its edges, at which the force F and the moment M about
+        its middle are F/2 +- M x a / b, and the thrust on its shoulder, if it does not slide."""
+
+        def row(kind: str, k: int) -> Expr:
+            held = (
+                AXES[k % 3] in draft.components
+                if not kind
+                else len(draft.components) > 2 or k % 3 == 2
+            )
+            return multiplier(f"{self.name}.{kind}{AXES[k % 3]}") if held else sp.S.Zero
+
+        i, j, k = axis, axis + 1, axis + 2  # a, b, c: right-handed
+        F = row("", j), row("", k)
+        if self.length is None:
+            return norm(*F)
+        text = f"length of the bearing of {self.name}"
+        b = draft.number(self.length, f"{self.name}.length", "m", text, positive=True)
+        arm = row("r", k) / b, -row("r", j) / b
+        edges = [norm(*(f / 2 + sign * a for f, a in zip(F, arm, strict=True))) for sign in (1, -1)]
+        return sp.Add(*edges, 0 if "along" in self.slides else norm(row("", i)))
 
 
 @dataclass(frozen=True, eq=False)

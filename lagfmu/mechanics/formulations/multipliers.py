@@ -36,7 +36,7 @@ def multipliers(name: str, M: Any, G: Any, F: Sequence[Expr], gamma: Sequence[Ex
         )
     if not m:
         return []
-    M, G = M.as_explicit().as_mutable(), G.as_explicit().as_mutable()
+    M, G = sp.Matrix(M), sp.Matrix(G)
     try:
         solved = M.LUsolve(G.T.row_join(sp.Matrix(F)))
         schur = (G * solved[:, :m]).applyfunc(sp.simplify)
