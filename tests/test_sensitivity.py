@@ -83,7 +83,9 @@ def test_the_best_friction_of_the_documentation_is_the_best(tmp_path, monkeypatc
     (tmp_path / "models").symlink_to(MODELS)
     command = re.search(r"^    lagfmu (build \S+cart_pendulum.*)$", page, re.MULTILINE)[1]
     run(*command.split(), "--no-check")
-    (block,) = (b for b in re.findall(r"```python\n(.*?)```", page, re.DOTALL) if "minimize" in b)
+    (block,) = (
+        b for b in re.findall(r"```python\n(.*?)```", page, re.DOTALL) if "scipy.optimize" in b
+    )
     told: dict = {}
     exec(block, told)
     best = told["found"].x[0]
