@@ -42,7 +42,8 @@ APPLICATION = (
 IN_SPACE = ("meshes.js", "space.js", "orbit.js")  # before the last, if the picture is in space
 WORKER = ("fmu.js", "worker.js")
 COMMENT = re.compile(r"^[ \t]*/\*.*?\*/[ \t]*\n", re.MULTILINE | re.DOTALL)
-INDENTATION = re.compile(r"^[ \t]+", re.MULTILINE)
+REMARK = re.compile(r"[ \t]+// [^\"'`\n]*$", re.MULTILINE)  # behind code, not within a string
+INDENTATION = re.compile(r"^\s+", re.MULTILINE)  # and empty lines
 LIBRARY, LIBRARY_STYLE, LICENCE = "uPlot.iife.min.js", "uPlot.min.css", "uPlot.LICENSE"
 SPACE, SPACE_LICENCE = "three.min.js", "three.LICENSE"
 
@@ -104,8 +105,8 @@ def _joined(names: Sequence[str]) -> str:
 
 
 def _lean(text: str) -> str:
-    """Without comments that begin a line, and without indentation: a fifth of the scripts."""
-    return INDENTATION.sub("", COMMENT.sub("", text))
+    """Without comments, empty lines and indentation: a fifth of the scripts."""
+    return INDENTATION.sub("", REMARK.sub("", COMMENT.sub("", text)))
 
 
 def _script(text: str) -> str:
