@@ -128,6 +128,7 @@ def test_the_closed_form_of_the_multipliers_is_exact(n):
     assert np.abs(rest).max() < 1e-10 * np.abs(gamma).max()
 
 
+@pytest.mark.thorough
 def test_an_energy_of_thousands_of_terms_has_a_value():
     """That of 500 bodies has 3,000, more than Python's compiler takes in one sum: 3,500 harmonics of 1 J each
     have 3,500 J at the place where all have their crest."""

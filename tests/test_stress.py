@@ -359,7 +359,11 @@ def test_rounding_of_a_mechanism_is_judged_by_what_it_is_made_of(lawful):
 @pytest.mark.parametrize(
     ("name", "wanted"),
     [
-        ("Bennett", {"one.inertia.yy = 4.5e-09", "two.center.x = 250", "one.position.y = 0"}),
+        pytest.param(
+            "Bennett",
+            {"one.inertia.yy = 4.5e-09", "two.center.x = 250", "one.position.y = 0"},
+            marks=pytest.mark.thorough,
+        ),
         ("Door", {"at rest"}),
     ],
 )
@@ -402,6 +406,7 @@ def test_a_body_that_may_not_turn_about_one_axis_is_judged_by_its_speeds(
         right(one, {probe})
 
 
+@pytest.mark.thorough
 def test_an_angle_between_axes_that_are_parallel_is_none(native_fmu):
     """The arms of a suspension begin 1e-18 rad from where their hinges are drawn: nothing of its motion
     happens in 1e-16 s."""
