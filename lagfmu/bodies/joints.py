@@ -143,8 +143,8 @@ class Joint:
 
     def rub(self, draft: Draft, axis: int, wrench: Wrench) -> None:
         """Coulomb's law for the motion that it leaves free: |torque| <= mu r N, |force| <= mu N, of a
-        cylindrical joint for the vector (v, r w); N is the norm of the force across the axis."""
-        normal = self.normal(draft, axis)
+        cylindrical joint for the vector (v, r w)."""
+        normal = self.normal(draft, axis, wrench)
         coefficients = draft.coefficients(self.friction, self.name)
         r = draft.number(
             self.radius, f"{self.name}.radius", "m", f"radius of the pin of {self.name}"
@@ -162,27 +162,18 @@ class Joint:
             normal *= r
         draft.constraints.append(Friction(self.name, rows, normal, *coefficients))
 
-    def normal(self, draft: Draft, axis: int) -> Expr:
-        """N [N]: of a bearing of length b the sum over its edges, at which the force F and the moment M about
-        its middle are F/2 +- M x a / b, and the thrust on its shoulder, if it does not slide."""
-
-        def row(kind: str, k: int) -> Expr:
-            held = (
-                AXES[k % 3] in draft.components
-                if not kind
-                else len(draft.components) > 2 or k % 3 == 2
-            )
-            return multiplier(f"{self.name}.{kind}{AXES[k % 3]}") if held else sp.S.Zero
-
-        i, j, k = axis, axis + 1, axis + 2  # a, b, c: right-handed
-        F = row("", j), row("", k)
+    def normal(self, draft: Draft, axis: int, wrench: Wrench) -> Expr:
+        """N [N]: the norm of the force F across the axis a.  Of a bearing of length b the sum over its edges,
+        at which F and the moment M about its middle are F/2 +- M x a / b, and the thrust on its shoulder."""
+        j, k = (axis + 1) % 3, (axis + 2) % 3  # a, b, c: right-handed
+        F = wrench.force[j], wrench.force[k]
         if self.length is None:
             return norm(*F)
         text = f"length of the bearing of {self.name}"
         b = draft.number(self.length, f"{self.name}.length", "m", text, positive=True)
-        arm = row("r", k) / b, -row("r", j) / b
+        arm = wrench.torque[k] / b, -wrench.torque[j] / b
         edges = [norm(*(f / 2 + sign * a for f, a in zip(F, arm, strict=True))) for sign in (1, -1)]
-        return sp.Add(*edges, 0 if "along" in self.slides else norm(row("", i)))
+        return sp.Add(*edges, 0 if "along" in self.slides else norm(wrench.force[axis]))
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,10 +23,8 @@ from .draft import Draft
 from .rows import TIME, Array, Rows, numbers_of
 
 STEPS, HALVINGS, RETURNS = 100, 12, 20
-TRIES, FEW = (
-    12,
-    4,
-)  # beginnings with other omitted values, where the first leads nowhere; that close
+TRIES = 12  # beginnings with other omitted values, where the first leads nowhere, ...
+FEW = 4  # ... until so many close
 STILL = 1e-6  # relative: rows that close to CLOSED leave such a motion
 LEAST = 1e-6  # of the way back: a gain that is none
 LIGHT = 1e-6  # what resists a parameter of a curve, which has no mass, of that of the body

@@ -49,8 +49,6 @@ if TYPE_CHECKING:
 
 STARTS = re.compile(rf"start value .* misses the constraints|{LEFT_OUT}")  # a message of a move
 BARS = "error bars"  # begins a message of them
-
-
 MOST = 5  # warnings that are told one by one
 
 
@@ -83,10 +81,9 @@ def simulate(
 
     Times in seconds; `start_values` maps parameters, coordinates, velocities and `solver.*` to values;
     `inputs` is a structured array with 'time' and one field an input, or a CSV file of such columns,
-    interpolated linearly.  What is left
-    out comes from the scene, or the FMU's DefaultExperiment.  `besides`: local variables and inputs to be
-    recorded too.  `error_bars`: a model's outputs have `error.NAME` beside them (docs/error_bars.md), as
-    those of an FMU have that was built with them.
+    interpolated linearly.  What is left out comes from the scene, or the FMU's DefaultExperiment.
+    `besides`: local variables and inputs to be recorded too.  `error_bars`: a model's outputs have
+    `error.NAME` beside them (docs/error_bars.md), as those of an FMU have that was built with them.
 
     Warns of each start value that is moved onto the constraints (starts.py), and of what the FMU itself warns
     of.  Raises ModelError for a model that cannot start, SimulationError if a step fails, and

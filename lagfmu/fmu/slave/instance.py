@@ -252,10 +252,10 @@ class Instance:
         for j, name in enumerate(states):
             k = self.reference[name]
             value, described = self.values[k], self.variables[k]
-            zero_meant = (
+            minus_zero = (
                 value == 0 and math.copysign(1.0, value) < 0
-            )  # -0: as Rule.asked hands it over
-            meant = value != described.start or zero_meant
+            )  # a 0 that Rule.asked hands over
+            meant = value != described.start or minus_zero
             said = SET if meant else GIVEN if described.given else OMITTED
             if said != SET and j in formulas:
                 value = formulas[j]
