@@ -62,15 +62,13 @@ def sensitivity(
     from ...study.sensitivity.local import sensitivity as found_by
     from ...study.sensitivity.ranges import over_ranges
     from ...verification.junit import text_of
-    from ...verification.reference import read_table
 
     outputs = [n for text in of for n in listed(text)]
     by = [n for text in to or () for n in listed(text)] or ALL
     with plainly(), made_for(target, outputs, by, scene) as fmu:
         units = units_of(read_description(fmu).modelVariables)
         given = options.assignments(set_, lambda: units)
-        signals = None if inputs is None else read_table(inputs)
-        run: dict[str, Any] = {"stop_time": stop_time, "step_size": step_size, "inputs": signals}
+        run: dict[str, Any] = {"stop_time": stop_time, "step_size": step_size, "inputs": inputs}
         found: Any
         if over:
             if to or given:

@@ -48,7 +48,6 @@ def simulate(
     from ...fmu.read import read_description, units_of
     from ...live.playable import told_by
     from ...prepare.prepare import prepare
-    from ...verification.reference import read_table
     from ...verification.simulate import simulate as simulated
     from ..film import film
     from ..scenes import for_models, loaded, narrowed
@@ -68,14 +67,13 @@ def simulate(
         besides = _besides(variable or (), known)
         given = options.assignments(set_, lambda: units_of(variables))
         with console.status(f"simulating {name}"):
-            signals = None if inputs is None else read_table(inputs)
             result = simulated(
                 run,
                 stop_time,
                 step_size,
                 tolerance,
                 given,
-                signals,
+                inputs,
                 besides=besides,
                 error_bars=bool(error_bars),
                 target=target,

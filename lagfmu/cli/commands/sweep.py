@@ -81,7 +81,6 @@ def sweep(
     from ...study.sweep.design import axis, distribution, from_file
     from ...study.sweep.plot import FIGURES, plot
     from ...study.sweep.sweep import sweep as run
-    from ...verification.reference import read_table
     from ..progress import told
     from ..swept import print_sweep
 
@@ -106,7 +105,7 @@ def sweep(
                 stop_time=stop_time,
                 step_size=step_size,
                 tolerance=tolerance,
-                inputs=None if inputs is None else read_table(inputs),
+                inputs=inputs,
                 scene=scene,
                 out=out,
                 on=on,
