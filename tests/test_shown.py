@@ -200,6 +200,7 @@ def test_what_joints_let_go_is_told_without_an_elimination() -> None:
     assert re.search(r"B\.ry +on velocities: B does not turn\n", told)
     assert re.search(r"R\.x +on velocities: R rolls without slipping\n", told)
     assert "slip.B.ry/|slip.B.ry|" in told
+    assert "ball.orientation.w = 1.0: assembled\n  the others as given: " in told
 
 
 def test_show_refuses_a_start_that_build_refuses(tmp_path: Path) -> None:

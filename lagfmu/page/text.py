@@ -230,9 +230,11 @@ def _starts(prepared: Prepared, console: Console) -> None:
     rough = {str(prepared.form.equations.symbols[s]) for s in prepared.model.rough}
     for v in prepared.whole.variables:
         if v.name in rough and v.start:
-            _print(console, "  ", f"{v.name} = {v.start!r} {shown(v.unit)}: assembled")
+            value = f"{v.start!r} {shown(v.unit)}".rstrip()
+            _print(console, "  ", f"{v.name} = {value}: assembled")
     if not moved:
-        console.print(Text("  as given: they satisfy the constraints"))
+        which = "the others as given" if rough else "as given"
+        _print(console, "  ", f"{which}: they satisfy the constraints")
     for m in moved:
         unit = shown(prepared.whole[m.name].unit)
         said = (
