@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lagfmu import derive
+from lagfmu import derive, simulate
 from lagfmu.bodies import Revolute, from_urdf, mechanism
 from lagfmu.errors import ModelError
 from lagfmu.testing import Form, model_source
@@ -85,6 +85,18 @@ WRONG: dict[str, tuple[tuple[str, ...], str]] = {
         "joint 'j' has the friction 0.1",
     ),
     "twice": ((BASE, link("a"), link("a"), joint("j", "base", "a")), "two links are called 'a'"),
+    "cycle apart": (
+        (BASE, link("a"), link("b"), joint("i", "a", "b"), joint("j", "b", "a")),
+        "the joints of the links 'a', 'b' form a cycle",
+    ),
+    "offset": (
+        (BASE, link("a"), joint("j", "base", "a", more='<mimic joint="k" offset="0.5"/>')),
+        r"Gear\(NAME, 'j', 'k', 1.0, 0.5\)",
+    ),
+    "no direction": (
+        (BASE, link("a"), joint("j", "base", "a").replace("0 0 1", "0 0 0")),
+        r"joint 'j' has the axis \[0.0, 0.0, 0.0\], expected a direction",
+    ),
 }
 
 
@@ -105,15 +117,68 @@ def test_all_problems_are_told_at_once(tmp_path: Path) -> None:
         from_urdf(robot(tmp_path, *parts))
 
 
-@pytest.mark.parametrize("text", ["", "<robot", "<sdf/>", '<robot name="R"><link/></robot>'])
-def test_a_file_that_is_no_urdf_is_refused(tmp_path: Path, text: str) -> None:
-    """One line with the path, never a traceback of the reader's."""
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("", "it is no XML: Document is empty"),
+        ('<robot name="R"><link name="base"/><link name="a"', "it is no XML"),
+        ("<sdf/>", "its root is <sdf>, expected <robot>"),
+        ('<robot name="R"/>', "<robot> in line 1 lacks <link>"),
+        ('<robot name="R"><link/></robot>', "<link> in line 1 lacks name="),
+        ('<robot name="R"><link name="${arm}"/></robot>', "is a macro: expand the file first"),
+        (
+            '<robot name="R"><a:b xmlns:a="http://ros.org/wiki/xacro"/></robot>',
+            "<b> in line 1 is a",
+        ),
+    ],
+)
+def test_a_file_that_is_no_urdf_is_refused(tmp_path: Path, text: str, told: str) -> None:
+    """Never a traceback of the reader's, nor what is left of half a file."""
     path = tmp_path / "x.urdf"
     path.write_text(text)
-    with pytest.raises(ModelError):
+    with pytest.raises(ModelError, match=told):
         from_urdf(path)
     with pytest.raises(ModelError, match="No such file"):
         from_urdf(tmp_path / "none.urdf")
+
+
+def test_what_is_no_number_or_missing_is_told_by_name_at_once(tmp_path: Path) -> None:
+    """Of masses, axes, places, dampers and shapes; what a link lacks is not taken for 1 kg m^2."""
+    looks = '<visual><geometry><box size="1 -1 1"/></geometry></visual><visual><geometry/></visual>'
+    place = '<origin xyz="0 inf 0"/><dynamics damping="much"/>'
+    parts = [
+        link("a", MASS.replace('mass value="1"', 'mass value="nan"') + looks),
+        link("b", '<inertial><mass value="1"/></inertial>'),
+        link("c", MASS.replace('ixx="1" ', "")),
+        joint("j", "base", "a", more=place).replace("0 0 1", "0 1"),
+    ]
+    with pytest.raises(ModelError) as caught:
+        from_urdf(robot(tmp_path, BASE, *parts))
+    told = str(caught.value)
+    assert "has 8 problems" in told
+    for problem in (
+        "link 'a': <mass value> is 'nan', expected a finite number",
+        "link 'a': <box size> is '1 -1 1', expected 3 finite numbers, none below 0",
+        "link 'a': <geometry> in line 1 is empty",
+        "link 'b': <inertial> in line 1 lacks <inertia>",
+        "link 'c': <inertia> in line 1 lacks ixx=",
+        "joint 'j': <axis xyz> is '0 1', expected 3 finite numbers",
+        "joint 'j': <origin xyz> is '0 inf 0'",
+        "joint 'j': <dynamics damping> is 'much', expected a finite number",
+    ):
+        assert problem in told, problem
+
+
+def test_a_damper_of_the_file_brakes_its_joint(tmp_path: Path) -> None:
+    """J w' = -c w of a hinge, m v' = -c v of a slide."""
+    damped = '<dynamics damping="0.5"/>'
+    axle = joint("h", "base", "a", more=damped)
+    slide = joint("s", "base", "b", "prismatic", damped)
+    parts = from_urdf(robot(tmp_path, BASE, link("a"), link("b"), axle, slide))
+    rates = ("der(angle.h)", "der(position.s)")
+    of = {"bodies": parts.bodies, "joints": parts.joints, "loads": parts.loads}
+    run = simulate(mechanism("D", **of, start=dict.fromkeys(rates, 2.0)), 1.0, tolerance=1e-10)
+    assert [run[rate][-1] for rate in rates] == pytest.approx([2 * np.exp(-0.5)] * 2, rel=1e-8)
 
 
 def test_hinges_share_their_code_however_their_markers_are_turned() -> None:

@@ -70,7 +70,7 @@ def _of_joint(joint: Joint, planar: bool) -> Iterator[str]:
     elif isinstance(limits, str) or not isinstance(limits, Sequence) or len(limits) != 2:
         yield f"{what}: limits are {limits!r}, expected the smallest and the largest value"
     elif all(map(is_number, limits)) and not float(limits[0]) < float(limits[1]):  # type: ignore[arg-type]
-        yield f"{what}: limits are {limits!r}, expected the smaller value first: exchange them"
+        yield f"{what}: limits are {limits!r}, expected the smaller value first, then a larger one"
 
 
 def _of_curve(part: PointOnCurve, planar: bool) -> Iterator[str]:

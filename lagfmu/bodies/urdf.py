@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from ..errors import LagfmuWarning, ModelError
 from ..model.picture import Box, Rod, Shape, Sphere
 from .body import Body, Ground, Marker
+from .check_urdf import number_of_dynamics, problems_of_parts, problems_of_text, problems_of_tree
 from .joints import Fixed, Joint, Prismatic, Revolute
 from .loads import Torsion
 from .rotation import onto
@@ -50,11 +51,11 @@ class Parts:
 def from_urdf(file: str | os.PathLike[str], limits: bool = True) -> Parts:
     """The bodies and joints of a URDF file; without `limits` its joints do not stop where it says so.
 
-    Raises ModelError with every problem at once: links without inertia that move, mimic joints, joints of a
-    kind that there is not, links with two parents or none, friction in a joint.
+    Raises ModelError with every problem at once: what is no number, links without inertia that move, mimic
+    joints, joints of a kind that there is not, links with two parents or none, friction in a joint.
     """
     robot = _read(Path(file))
-    problems = _problems_of_tree(robot) or _problems_of_parts(robot)
+    problems = [*problems_of_tree(robot), *problems_of_parts(robot, KINDS)]
     if problems:
         raise ModelError(str(robot.name), problems)
     _tell_of_meshes(robot)
@@ -71,78 +72,13 @@ def _read(path: Path) -> Any:
     except OSError as error:
         problem = f"{str(path)!r} cannot be read ({error.strerror or error}): correct the path"
         raise ModelError(path.name, [problem]) from None
-    from io import BytesIO
-
+    if problems := problems_of_text(content):
+        raise ModelError(path.name, problems)
     try:
         return URDF.load(BytesIO(content), build_scene_graph=False, load_meshes=False).robot
-    except Exception as error:  # of lxml, of a number that is none, of an element that is missing
+    except Exception as error:  # of what lagfmu does not need: a colour, a calibration
         problem = f"{str(path)!r} is no URDF file that can be read: {str(error).splitlines()[0]}"
         raise ModelError(path.name, [problem]) from None
-
-
-def _problems_of_tree(robot: Any) -> list[str]:
-    """What is no tree of known links with one root."""
-    links = [link.name for link in robot.links]
-    problems = [f"two links are called {n!r}: rename one" for n in _twice(links)]
-    problems += [f"two joints are called {n!r}: rename one" for n in _twice(_names(robot.joints))]
-    parents: dict[str, list[str]] = defaultdict(list)
-    for joint in robot.joints:
-        for end, link in (("parent", joint.parent), ("child", joint.child)):
-            if link not in links:
-                problems.append(f"joint {joint.name!r}: its {end} {link!r} is no link of the file")
-        parents[joint.child].append(joint.name)
-    problems += [
-        f"link {link!r} is the child of {' and '.join(map(repr, of))}, expected one joint: URDF has trees "
-        "only; close a loop by a joint of your own beside those of the file"
-        for link, of in parents.items()
-        if len(of) > 1
-    ]
-    roots = [link for link in links if link not in parents]
-    if len(roots) != 1 and not problems:
-        found = ", ".join(map(repr, roots)) or "none: the joints form a cycle"
-        problems.append(f"the file has the root links {found}, expected one")
-    if not problems and len(robot.joints) >= len(links):
-        problems.append("the joints form a cycle: URDF has trees only")
-    return problems
-
-
-def _problems_of_parts(robot: Any) -> list[str]:
-    problems = []
-    for joint in robot.joints:
-        if joint.type not in KINDS:
-            problems.append(
-                f"joint {joint.name!r} is of the type {joint.type!r}, expected one of "
-                f"{', '.join(KINDS)}: build it from bodies and joints of lagfmu"
-            )
-        if joint.mimic is not None:
-            problems.append(
-                f"joint {joint.name!r} mimics {joint.mimic.joint!r}: leave the mimic out, and add Gear(NAME, "
-                f"{joint.name!r}, {joint.mimic.joint!r}, {joint.mimic.multiplier or 1.0!r}) to the joints"
-            )
-        if friction := _dynamics(joint, "friction"):
-            problems.append(
-                f"joint {joint.name!r} has the friction {friction!r}, which no normal force "
-                "limits: leave it out, and give the joint of lagfmu a coefficient of friction"
-            )
-        if joint.type != "fixed" and joint.axis is not None and not np.linalg.norm(joint.axis) > 0:
-            problems.append(f"joint {joint.name!r} has the axis {joint.axis}, expected a direction")
-    root = _root(robot)
-    fixed = {joint.child for joint in robot.joints if joint.type == "fixed"}
-    for link in robot.links:
-        if link.name != root and link.name not in fixed and not _mass(link):
-            problems.append(
-                f"link {link.name!r} moves and has no inertia: give it an <inertial> with mass and inertia, "
-                "or a fixed joint to a link that has one"
-            )
-    return problems
-
-
-def _twice(names: Sequence[str]) -> list[str]:
-    return sorted({n for n in names if names.count(n) > 1})
-
-
-def _names(things: Sequence[Any]) -> list[str]:
-    return [thing.name for thing in things]
 
 
 def _root(robot: Any) -> str:
@@ -150,13 +86,8 @@ def _root(robot: Any) -> str:
     return next(str(link.name) for link in robot.links if link.name not in children)
 
 
-def _dynamics(joint: Any, name: str) -> float:
-    """A number of <dynamics>, which yourdfpy hands on as text."""
-    return float(getattr(joint.dynamics, name, None) or 0.0)
-
-
 def _mass(link: Any) -> float:
-    return float(link.inertial.mass or 0.0) if link.inertial is not None else 0.0
+    return float(link.inertial.mass) if link.inertial is not None else 0.0
 
 
 class _Builder:
@@ -227,8 +158,8 @@ class _Builder:
         first, second = _marker(carrier, pose @ turned), _marker(body, turned)
         axis_of_marker = "" if joint.type == "fixed" else "z"
         self.joints.append(kind(joint.name, first, second, axis_of_marker, limits))
-        if damping := _dynamics(joint, "damping"):
-            self.loads.append(Torsion(f"{joint.name}.damper", joint.name, damping=damping))
+        if damping := number_of_dynamics(joint, "damping"):
+            self.loads.append(Torsion(f"{joint.name}_damper", joint.name, damping=damping))
 
 
 def _body(link: Any, shapes: list[Shape]) -> Body:

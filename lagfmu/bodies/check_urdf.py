@@ -1,0 +1,167 @@
+"""What is wrong with a URDF file, in words, before a body is made of it: its text, its tree, its parts."""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Collection, Iterator, Sequence
+from typing import Any
+
+import numpy as np
+from lxml import etree
+
+# What an element must have: attributes, and elements in it.
+NEEDED: dict[str, tuple[Sequence[str], Sequence[str]]] = {
+    "robot": (("name",), ("link",)),
+    "link": (("name",), ()),
+    "joint": (("name", "type"), ("parent", "child")),
+    "parent": (("link",), ()),
+    "child": (("link",), ()),
+    "mimic": (("joint",), ()),
+    "inertial": ((), ("mass", "inertia")),
+    "mass": (("value",), ()),
+    "inertia": (("ixx", "iyy", "izz"), ()),
+    "visual": ((), ("geometry",)),
+    "collision": ((), ("geometry",)),
+    "box": (("size",), ()),
+    "cylinder": (("radius", "length"), ()),
+    "sphere": (("radius",), ()),
+    "mesh": (("filename",), ()),
+}
+COUNTS = {  # how many numbers an attribute holds
+    "origin": {"xyz": 3, "rpy": 3},
+    "axis": {"xyz": 3},
+    "mass": {"value": 1},
+    "inertia": dict.fromkeys(("ixx", "iyy", "izz", "ixy", "ixz", "iyz"), 1),
+    "limit": {"lower": 1, "upper": 1},
+    "dynamics": {"damping": 1, "friction": 1},
+    "mimic": {"multiplier": 1, "offset": 1},
+    "box": {"size": 3},
+    "cylinder": {"radius": 1, "length": 1},
+    "sphere": {"radius": 1},
+}
+SHAPES = ("box", "cylinder", "sphere", "mesh")
+
+
+def problems_of_text(content: bytes) -> list[str]:
+    """What is no XML, or XML of which something is missing, no number, or written by macros."""
+    try:
+        root = etree.fromstring(content)
+    except (etree.XMLSyntaxError, ValueError) as error:
+        return [f"it is no XML: {error}"]
+    elements = [e for e in root.iter() if isinstance(e.tag, str)]
+    for e in elements:
+        if "xacro" in e.tag or any("${" in value for value in e.attrib.values()):
+            tag = etree.QName(e).localname
+            return [f"<{tag}> in line {e.sourceline} is a macro: expand the file first, by xacro"]
+    if root.tag != "robot":
+        return [f"its root is <{root.tag}>, expected <robot>"]
+    problems = list(_of_element("the file", root))
+    for part in root:
+        if part.tag in ("link", "joint"):
+            what = f"{part.tag} {part.get('name', '')!r}"
+            problems += [p for e in part.iter(*NEEDED, *COUNTS) for p in _of_element(what, e)]
+            problems += [
+                f"{what} looks like <{shape.tag}>, expected {', '.join(SHAPES)}: leave it out"
+                for shape in part.iterfind(".//geometry/*")
+                if isinstance(shape.tag, str) and shape.tag not in SHAPES
+            ]
+            problems += [
+                f"{what}: <geometry> in line {geometry.sourceline} is empty, expected {', '.join(SHAPES)}"
+                for geometry in part.iter("geometry")
+                if geometry.find("*") is None
+            ]
+    return problems
+
+
+def _of_element(what: str, element: Any) -> Iterator[str]:
+    attributes, children = NEEDED.get(element.tag, ((), ()))
+    for name in attributes:
+        if not element.get(name):
+            yield f"{what}: <{element.tag}> in line {element.sourceline} lacks {name}="
+    for name in children:
+        if element.find(name) is None:
+            yield f"{what}: <{element.tag}> in line {element.sourceline} lacks <{name}>"
+    for name, count in COUNTS.get(element.tag, {}).items():
+        text, least = element.get(name), 0.0 if element.tag in SHAPES else -math.inf
+        if text and not _are_numbers(text, count, least):
+            wanted = "a finite number" if count == 1 else f"{count} finite numbers"
+            size = ", none below 0" if element.tag in SHAPES else ""
+            yield f"{what}: <{element.tag} {name}> is {text!r}, expected {wanted}{size}"
+
+
+def _are_numbers(text: str, count: int, least: float) -> bool:
+    try:
+        values = [float(word) for word in text.split()]
+    except ValueError:
+        return False
+    return len(values) == count and all(math.isfinite(x) and x >= least for x in values)
+
+
+def problems_of_tree(robot: Any) -> list[str]:
+    """What is no tree of known links with one root."""
+    links, joints = ([thing.name for thing in things] for things in (robot.links, robot.joints))
+    problems = [f"two links are called {name!r}: rename one" for name in _twice(links)]
+    problems += [f"two joints are called {name!r}: rename one" for name in _twice(joints)]
+    parents: dict[str, list[str]] = defaultdict(list)
+    children: dict[str, list[str]] = defaultdict(list)
+    for joint in robot.joints:
+        for end, link in (("parent", joint.parent), ("child", joint.child)):
+            if link not in links:
+                problems.append(f"joint {joint.name!r}: its {end} {link!r} is no link of the file")
+        parents[joint.child].append(joint.name)
+        children[joint.parent].append(joint.child)
+    problems += [
+        f"link {link!r} is the child of {' and '.join(map(repr, of))}, expected one joint: URDF has trees "
+        "only; close a loop by a joint of your own beside those of the file"
+        for link, of in parents.items()
+        if len(of) > 1
+    ]
+    if problems:
+        return problems
+    roots = [link for link in links if link not in parents]
+    if len(roots) > 1:
+        return [f"the file has the root links {', '.join(map(repr, roots))}, expected one"]
+    reached = set(roots)
+    while further := {c for link in reached for c in children[link]} - reached:
+        reached |= further
+    if round_ := [repr(link) for link in links if link not in reached]:
+        return [f"the joints of the links {', '.join(round_)} form a cycle: URDF has trees only"]
+    return []
+
+
+def problems_of_parts(robot: Any, kinds: Collection[str]) -> Iterator[str]:
+    """Joints of another kind than these, with what lagfmu has not, and links that move without mass."""
+    mass = {link.name: link.inertial and link.inertial.mass for link in robot.links}
+    for joint in robot.joints:
+        what = f"joint {joint.name!r}"
+        if joint.type not in kinds:
+            yield (
+                f"{what} is of the type {joint.type!r}, expected one of {', '.join(kinds)}: build it from "
+                "bodies and joints of lagfmu"
+            )
+        if joint.mimic is not None:
+            of, ratio, offset = joint.mimic.joint, joint.mimic.multiplier, joint.mimic.offset
+            gear = f"Gear(NAME, {joint.name!r}, {of!r}, {ratio!r}{f', {offset!r}' * bool(offset)})"
+            yield f"{what} mimics {of!r}: leave the mimic out, and add {gear} to the joints"
+        if friction := number_of_dynamics(joint, "friction"):
+            yield (
+                f"{what} has the friction {friction!r}, which no normal force limits: leave it out, and give "
+                "the joint of lagfmu a coefficient of friction"
+            )
+        if joint.type != "fixed" and joint.axis is not None and not np.linalg.norm(joint.axis) > 0:
+            yield f"{what} has the axis {joint.axis.tolist()}, expected a direction"
+        if joint.type != "fixed" and not mass.get(joint.child, True):
+            yield (
+                f"link {joint.child!r} moves and has no inertia: give it an <inertial> with mass and "
+                "inertia, or a fixed joint to a link that has one"
+            )
+
+
+def number_of_dynamics(joint: Any, name: str) -> float:
+    """A number of <dynamics>, which yourdfpy hands on as text."""
+    return float(getattr(joint.dynamics, name, None) or 0.0)
+
+
+def _twice(names: Sequence[str]) -> list[str]:
+    return sorted({n for n in names if names.count(n) > 1})
