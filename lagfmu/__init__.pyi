@@ -3,7 +3,8 @@
 from .api import build_fmu, show
 from .errors import LagfmuError, VerificationError
 from .live.command import play
-from .mechanics.equations import EquationsOfMotion, derive
+from .mechanics.derive import derive
+from .mechanics.equations import EquationsOfMotion
 from .mechanics.integrability.classify import classify
 from .model.attitude import rotation_matrix
 from .model.closed_form import ClosedForm, Conserved, departure, initial, output

@@ -53,8 +53,8 @@ from .mechanics.formulations.nullspace import lambda_free, null_space
 from .mechanics.integrability.classify import Kind, pfaffian
 from .mechanics.jumps import jumps_of, with_jumps
 from .model.attitude import Carried, rotation_matrix, written_out
-from .model.closed_form import TIME
 from .model.differential import Differential
+from .model.elements import TIME
 from .model.expression import LONGEST_SUM, read_formula, text_of
 from .model.file import ModelFile, load
 from .model.formula import with_outputs

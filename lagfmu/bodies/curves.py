@@ -15,7 +15,7 @@ import numpy as np
 import sympy as sp
 from sympy.physics.vector import dynamicsymbols
 
-from ..model.elements import Expr, Friction, Nonholonomic
+from ..model.elements import TIME, Expr, Friction, Nonholonomic
 from ..model.norms import norm
 from ..model.picture import Track
 from ..model.reactions import multiplier
@@ -27,7 +27,6 @@ from .joints import model_number, places
 from .motion import Timed, between, product
 from .vectors import length
 
-TIME = dynamicsymbols._t
 PLACES = 65  # along the curve, at which it is tried where the point may begin
 
 

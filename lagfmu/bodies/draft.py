@@ -16,6 +16,7 @@ from sympy.core.function import AppliedUndef
 from sympy.physics.vector import dynamicsymbols
 
 from ..model.elements import (
+    TIME,
     Constraint,
     Expr,
     Friction,
@@ -30,8 +31,6 @@ from ..names import derivative
 from .body import Body, Ground, Marker
 from .motion import Motion, Placed, Timed, about
 from .vectors import AXES, ZERO, Vector, cross, dot, minus, times
-
-TIME = dynamicsymbols._t
 
 
 class Wrench:

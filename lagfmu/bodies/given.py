@@ -11,13 +11,13 @@ import numpy as np
 import sympy as sp
 
 from ..errors import ModelError
-from ..model.elements import Expr, is_number, name_of
+from ..model.elements import TIME, Expr, is_number, name_of
 from ..model.model import Model
 from ..names import derivative
 from .body import Body
 from .draft import Draft
 from .rotation import given_rotation, quaternion
-from .rows import TIME, Array
+from .rows import Array
 
 
 class Beginning(NamedTuple):

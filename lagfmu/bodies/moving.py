@@ -14,13 +14,13 @@ import numpy as np
 import sympy as sp
 from scipy.sparse import csr_array, diags_array, hstack, vstack
 
-from ..model.elements import name_of
+from ..model.elements import TIME, name_of
 from ..model.model import Model
 from ..numeric.linear import divided, factor, norms, row_sizes
 from ..numeric.system import Sparse
 from .branches import CLOSED
 from .draft import Draft
-from .rows import TIME, Array, Rows, numbers_of
+from .rows import Array, Rows, numbers_of
 
 STEPS, HALVINGS, RETURNS = 100, 12, 20
 TRIES = 12  # beginnings with other omitted values, where the first leads nowhere, ...

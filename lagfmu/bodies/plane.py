@@ -12,13 +12,12 @@ from typing import Any
 import sympy as sp
 from sympy.physics.vector import dynamicsymbols
 
-from ..model.elements import Expr, is_number
+from ..model.elements import TIME, Expr, is_number
 from .body import Body, Ground, Marker
 from .draft import Draft
 from .motion import Motion, Placed
 from .vectors import ZERO, Vector, minus
 
-TIME = dynamicsymbols._t
 EXACT = 12  # parts of pi that an angle may be of, and have a sine without rounding
 
 

@@ -15,16 +15,14 @@ import sympy as sp
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from sympy.core.function import AppliedUndef
-from sympy.physics.vector import dynamicsymbols
 
 from ..model.alike import Pattern, Place, pattern
 from ..model.closing import Closing, computed
 from ..model.differential import Differential
-from ..model.elements import Constraint, Expr, Nonholonomic, Tie
+from ..model.elements import TIME, Constraint, Expr, Nonholonomic, Tie
 from ..model.model import Model
 from ..numeric.system import Sparse
 
-TIME = dynamicsymbols._t
 Array = NDArray[np.float64]
 
 

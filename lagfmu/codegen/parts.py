@@ -16,12 +16,12 @@ from typing import Any
 
 import sympy as sp
 
-from ..mechanics.equations import TIME, EquationsOfMotion, formulas_of
+from ..mechanics.equations import EquationsOfMotion, formulas_of
 from ..mechanics.form import Form
 from ..mechanics.formulations.minimal import Reduction
 from ..mechanics.jumps import NONE, Jumps
 from ..model.differential import Differential
-from ..model.elements import Expr
+from ..model.elements import TIME, Expr
 from ..model.model import Constraint, Contact, Nonholonomic
 from ..model.units import ONE, SECOND, Unit
 from ..numeric.system import CONTACT, HOLONOMIC, NONHOLONOMIC, Friction, Row

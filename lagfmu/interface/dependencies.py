@@ -10,9 +10,9 @@ import sympy as sp
 
 from .. import names
 from ..mechanics.coupling import coupled
-from ..mechanics.equations import TIME, EquationsOfMotion
+from ..mechanics.equations import EquationsOfMotion
 from ..mechanics.form import Form
-from ..model.elements import Expr
+from ..model.elements import TIME, Expr
 
 Names = frozenset[str]
 

@@ -8,13 +8,13 @@ from dataclasses import replace
 import sympy as sp
 
 from ..errors import RequestError, UnitError
-from ..model.elements import Expr
+from ..model.elements import TIME, Expr
 from ..model.model import Contact, Model, Parameter, name_of
 from ..model.rule import Rule
 from ..model.scene import Scene
 from ..model.selection import select
 from ..model.units import Unit, parse_quantity
-from .equations import TIME, EquationsOfMotion
+from .equations import EquationsOfMotion
 from .form import Form
 
 

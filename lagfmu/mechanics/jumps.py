@@ -23,8 +23,8 @@ from sympy.core.relational import Relational
 from sympy.printing.precedence import precedence
 
 from ..errors import ModelError
-from ..model.elements import Expr
-from .equations import TIME, EquationsOfMotion
+from ..model.elements import TIME, Expr
+from .equations import EquationsOfMotion
 from .form import Form
 
 SAMPLES = 6  # points of a surface at which a jump is looked for

@@ -9,10 +9,9 @@ from collections.abc import Mapping
 
 import sympy as sp
 from sympy.core.function import AppliedUndef
-from sympy.physics.vector import dynamicsymbols
 
 from ..names import read
-from .elements import Contact, Expr, ModelFields, Nonholonomic, is_number, name_of
+from .elements import TIME, Contact, Expr, ModelFields, Nonholonomic, is_number, name_of
 from .frictions import check_frictions
 from .kinds import check_energy, check_names, check_types
 from .outputs import check_output_units, check_outputs
@@ -56,7 +55,6 @@ def problems_of(model: ModelFields) -> list[str]:
 
 
 def _check_numbers(model: ModelFields, problems: list[str]) -> None:
-    t = dynamicsymbols._t
     for p in model.parameters:
         _finite(f"parameter {name_of(p.symbol)!r}", p.value, problems)
         for bound, value in (("min", p.min), ("max", p.max)):
@@ -107,7 +105,7 @@ def _check_numbers(model: ModelFields, problems: list[str]) -> None:
         if s not in model.start
     ]
     if model.embedding is not None:
-        states = {s for q in model.embedding.coordinates for s in (q, q.diff(t))}
+        states = {s for q in model.embedding.coordinates for s in (q, q.diff(TIME))}
         _check_start("embedding start", model.embedding.start, states, parameters, problems)
         for q in model.embedding.relations:
             if q not in model.coordinates:
@@ -248,8 +246,7 @@ def _solved_for(what: str, expression: Expr) -> list[str]:
 
 def declared_units(model: ModelFields, problems: list[str]) -> dict[Expr, Unit]:
     """Unit of each symbol that may stand in an expression; what cannot be read joins `problems`."""
-    t = dynamicsymbols._t
-    units: dict[Expr, Unit] = {t: parse_unit("s", "time")}
+    units: dict[Expr, Unit] = {TIME: parse_unit("s", "time")}
     extra = model.embedding.coordinates if model.embedding else {}
     declared = [("coordinate", q, u) for q, u in (*model.coordinates.items(), *extra.items())]
     declared += [("speed", w, u) for w, u in model.speeds.items()]
@@ -261,8 +258,8 @@ def declared_units(model: ModelFields, problems: list[str]) -> dict[Expr, Unit]:
             continue
         units[symbol] = unit
         if isinstance(symbol, AppliedUndef):
-            units[symbol.diff(t)] = unit.per_second()
-            units[symbol.diff(t, 2)] = unit.per_second().per_second()
+            units[symbol.diff(TIME)] = unit.per_second()
+            units[symbol.diff(TIME, 2)] = unit.per_second().per_second()
     return units
 
 

@@ -10,12 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import sympy as sp
-from sympy.physics.vector import dynamicsymbols
 
 from .. import names
-from .elements import Expr, name_of
-
-TIME = dynamicsymbols._t
+from .elements import TIME, Expr, name_of
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,10 +13,9 @@ from collections.abc import Mapping, Sequence
 
 import sympy as sp
 from sympy.physics.mechanics import LagrangesMethod, Lagrangian, System
-from sympy.physics.vector import dynamicsymbols
 
 from ..errors import ModelError
-from .elements import Expr
+from .elements import TIME, Expr
 from .model import Constraint, Holonomic, Input, Model, Nonholonomic, Parameter, name_of
 
 
@@ -120,12 +119,12 @@ def _forces(
     method: LagrangesMethod, q: Sequence[Expr], speeds: Mapping[Expr, Expr]
 ) -> dict[Expr, Expr]:
     """Generalized forces Q_j = sum F . dv/d(qdot_j) of the method's force list (Kane's formula)."""
-    t, frame = dynamicsymbols._t, method.inertial
+    frame = method.inertial
     forces: dict[Expr, Expr] = {}
     for body, load in method.forcelist or []:
         velocity = body.vel(frame) if hasattr(body, "vel") else body.ang_vel_in(frame)
         velocity, load = velocity.xreplace(speeds), load.xreplace(speeds)
         for c in q:
-            share = velocity.diff(c.diff(t), frame).dot(load)
+            share = velocity.diff(c.diff(TIME), frame).dot(load)
             forces[c] = forces.get(c, sp.S.Zero) + share
     return {c: f for c, f in forces.items() if f != 0}

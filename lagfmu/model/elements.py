@@ -13,6 +13,7 @@ import sympy as sp
 from sympy.core.function import AppliedUndef
 from sympy.physics.vector import dynamicsymbols
 
+TIME = dynamicsymbols._t
 Expr = Any  # a SymPy expression: SymPy 1.14 ships no types, so that a stricter name would check nothing
 
 NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
@@ -206,10 +207,9 @@ class ModelFields:
     @property
     def states(self) -> tuple[Expr, ...]:
         """What can start somewhere: coordinates, and the speeds in the order of `directions`."""
-        t = dynamicsymbols._t
         return (
             *self.coordinates,
-            *(s if s in self.speeds else s.diff(t) for s in self.directions),
+            *(s if s in self.speeds else s.diff(TIME) for s in self.directions),
         )
 
     @property

@@ -11,11 +11,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import sympy as sp
-from sympy.physics.vector import dynamicsymbols
 
 from ..errors import RequestError
 from ..names import derivative
-from .elements import Expr, Input, Output, name_of
+from .elements import TIME, Expr, Input, Output, name_of
 from .model import Model
 from .named import UnknownNameError, read_named
 from .reactions import force_of_constraint, multiplier
@@ -51,16 +50,15 @@ def _output(text: str, model: Model, problems: list[str]) -> Output | None:
 
 def _known(model: Model) -> dict[str, Expr]:
     """The names of the FMU's variables that an output can hold, and what they mean."""
-    t = dynamicsymbols._t
-    known: dict[str, Expr] = {"time": t, "pi": sp.pi}
+    known: dict[str, Expr] = {"time": TIME, "pi": sp.pi}
     known |= {name_of(p.symbol): p.symbol for p in model.parameters}
     for symbol in (*model.coordinates, *model.speeds, *(i.symbol for i in model.inputs)):
         name = name_of(symbol)
         known[name] = symbol
         if symbol in model.speeds:
-            known[derivative(name)] = symbol.diff(t)
+            known[derivative(name)] = symbol.diff(TIME)
         elif symbol in model.coordinates or _moves(model, symbol):
-            known |= {derivative(name, k): symbol.diff(t, k) for k in (1, 2)}
+            known |= {derivative(name, k): symbol.diff(TIME, k) for k in (1, 2)}
     reactions = [multiplier(c.name) for c in model.constraints]
     reactions += [force_of_constraint(q) for q in model.directions]
     return known | {str(s): s for s in reactions}

@@ -10,10 +10,9 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 
 import sympy as sp
-from sympy.physics.mechanics import dynamicsymbols
 
 from ..errors import UnitError
-from .elements import NAME, Contact, Expr, Friction, ModelFields, Nonholonomic
+from .elements import NAME, TIME, Contact, Expr, Friction, ModelFields, Nonholonomic
 from .norms import norms_of
 from .reactions import multiplier, reactions_in
 from .symbols import undeclared
@@ -153,10 +152,9 @@ def _check_directions(
     rows = [sp.sympify(known[name].expression) for name in f.of if name in known]
     if len(rows) != MOST_ROWS or len(rows) != len(f.of):
         return
-    t = dynamicsymbols._t
-    rates = [q.diff(t) for q in model.coordinates]
+    rates = [q.diff(TIME) for q in model.coordinates]
     rows = [
-        row if isinstance(known[name], Nonholonomic) else row.diff(t)
+        row if isinstance(known[name], Nonholonomic) else row.diff(TIME)
         for name, row in zip(f.of, rows, strict=True)
     ]
     straight = [

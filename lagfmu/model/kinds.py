@@ -13,10 +13,10 @@ from typing import Any
 
 import sympy as sp
 from sympy.core.function import AppliedUndef
-from sympy.physics.vector import dynamicsymbols
 
 from ..names import RESERVED, read
 from .elements import (
+    TIME,
     Contact,
     Embedding,
     Expr,
@@ -160,7 +160,7 @@ def check_names(model: ModelFields, problems: list[str]) -> None:
     extra = model.embedding.coordinates if model.embedding else {}
     for kind, symbols in (("coordinate", (*model.coordinates, *extra)), ("speed", model.speeds)):
         for q in symbols:
-            if not (isinstance(q, AppliedUndef) and q.args == (dynamicsymbols._t,)):
+            if not (isinstance(q, AppliedUndef) and q.args == (TIME,)):
                 problems.append(
                     f"{kind} {q} is no function of time: write it as dynamicsymbols('{q}')"
                 )

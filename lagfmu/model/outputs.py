@@ -6,10 +6,9 @@ from collections.abc import Collection, Iterator, Mapping
 
 import sympy as sp
 from sympy.core.function import AppliedUndef
-from sympy.physics.vector import dynamicsymbols
 
 from ..names import MULTIPLIER, read
-from .elements import Contact, Expr, ModelFields, Nonholonomic, Peak, name_of
+from .elements import TIME, Contact, Expr, ModelFields, Nonholonomic, Peak, name_of
 from .reactions import force_of_constraint, multiplier, reaction_units, reactions_in
 from .symbols import known_symbols, undeclared
 from .units import Unit, check_dimension, declared_unit, plain
@@ -104,7 +103,6 @@ def _undefined(model: ModelFields, what: str, expression: Expr) -> Iterator[str]
 
 def _nothing_in_the_open(model: ModelFields, contact: str) -> dict[Expr, Expr]:
     """The multipliers and forces of constraint that are 0 while a contact is open."""
-    t = dynamicsymbols._t
     gone, left = {}, set()
     for c in model.constraints:
         if c.name == contact or getattr(c, "while_closed", None) == contact:
@@ -112,7 +110,7 @@ def _nothing_in_the_open(model: ModelFields, contact: str) -> dict[Expr, Expr]:
         elif hasattr(c, "expression"):
             held = sp.sympify(c.expression).atoms(AppliedUndef, sp.Derivative)
             rate = isinstance(c, Nonholonomic)
-            left |= {q for q in model.coordinates if (q.diff(t) if rate else q) in held}
+            left |= {q for q in model.coordinates if (q.diff(TIME) if rate else q) in held}
             left |= held & model.speeds.keys()
     for q in left & model.kinematics.keys():
         left |= sp.sympify(model.kinematics[q]).atoms(AppliedUndef) & model.speeds.keys()

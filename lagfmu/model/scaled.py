@@ -13,10 +13,9 @@ from dataclasses import replace
 from typing import Any
 
 from sympy.core.function import AppliedUndef
-from sympy.physics.mechanics import dynamicsymbols
 
 from ..errors import UnitError
-from .elements import Expr, Input, ModelFields, Output, Parameter, is_number, name_of
+from .elements import TIME, Expr, Input, ModelFields, Output, Parameter, is_number, name_of
 from .units import DisplayUnit, parse_scaled
 
 
@@ -76,7 +75,7 @@ def _motion(
             continue
         units[q] = unit.unit.name
         shown[name_of(q)] = unit.name
-        for state in (q, q.diff(dynamicsymbols._t)):
+        for state in (q, q.diff(TIME)):
             if state in values and is_number(values[state]):
                 values[state] = unit.to_si(float(values[state]))
     return units, values

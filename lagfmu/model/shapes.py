@@ -5,11 +5,10 @@ than one component.  Each is named with what to write instead.
 from __future__ import annotations
 
 import sympy as sp
-from sympy.physics.vector import dynamicsymbols
 from sympy.physics.vector.dyadic import Dyadic
 from sympy.physics.vector.vector import Vector
 
-from .elements import Contact, Expr, Holonomic, ModelFields
+from .elements import TIME, Contact, Expr, Holonomic, ModelFields
 from .units import plain
 
 KINKED = (sp.Abs, sp.sign, sp.Heaviside, sp.Max, sp.Min, sp.floor, sp.ceiling, sp.Mod)
@@ -44,7 +43,7 @@ def unusable_surfaces(model: ModelFields) -> list[str]:
     """Functions f of constraints that lack a second derivative, or whose gradient vanishes with them."""
     problems = []
     changing = (*model.coordinates, *(i.symbol for i in model.inputs))
-    moving = {dynamicsymbols._t}.union(*(s.free_symbols for s in changing))
+    moving = {TIME}.union(*(s.free_symbols for s in changing))
     for c in model.constraints:
         if not isinstance(c, (Holonomic, Contact)):
             continue

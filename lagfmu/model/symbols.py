@@ -6,16 +6,15 @@ from collections.abc import Collection
 
 import sympy as sp
 from sympy.core.function import AppliedUndef
-from sympy.physics.vector import dynamicsymbols
 
-from .elements import Expr, ModelFields, name_of
+from .elements import TIME, Expr, ModelFields, name_of
 from .units import plain
 
 
 def known_symbols(model: ModelFields) -> set[Expr]:
     """Coordinates, speeds, parameters, inputs and time."""
     declared = {p.symbol for p in model.parameters} | {i.symbol for i in model.inputs}
-    return {*model.coordinates, *model.speeds, *declared, dynamicsymbols._t}
+    return {*model.coordinates, *model.speeds, *declared, TIME}
 
 
 def undeclared(

@@ -12,7 +12,8 @@ from typing import Any
 
 import sympy as sp
 from sympy.core.function import AppliedUndef
-from sympy.physics.vector import dynamicsymbols
+
+from .elements import TIME
 
 
 def foreign_times(text: bytes, names: Mapping[str, Any]) -> list[str]:
@@ -30,7 +31,7 @@ def foreign_times(text: bytes, names: Mapping[str, Any]) -> list[str]:
         else:
             continue
         moving = names.get(what.id) if isinstance(what, ast.Name) else None
-        if not isinstance(moving, AppliedUndef) or not moving.has(dynamicsymbols._t):
+        if not isinstance(moving, AppliedUndef) or not moving.has(TIME):
             continue
         for one in by:
             other = names.get(one.id) if isinstance(one, ast.Name) else None

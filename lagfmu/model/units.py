@@ -22,11 +22,10 @@ from sympy.functions.elementary.trigonometric import (
     InverseTrigonometricFunction,
     TrigonometricFunction,
 )
-from sympy.physics.mechanics import dynamicsymbols
 
 from ..errors import UnitError
 from .attitude import Attitude, Carried
-from .elements import Expr
+from .elements import TIME, Expr
 
 BASE = ("kg", "m", "s", "A", "K", "mol", "cd")
 SUPERSCRIPT = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
@@ -303,7 +302,7 @@ def plain(expr: Expr) -> str:
     names: dict[Expr, Expr] = {}
     for node in expr.atoms(sp.Derivative):
         order = sum(int(count) for _, count in node.variable_count)
-        wrt = [plain(v) for v, _ in node.variable_count if v != dynamicsymbols._t]
+        wrt = [plain(v) for v, _ in node.variable_count if v != TIME]
         tail = [plain(node.expr), *wrt, *([str(order)] if order > 1 else [])]
         names[node] = sp.Symbol(f"der({','.join(tail)})")
     for node in expr.atoms(AppliedUndef):
@@ -380,9 +379,9 @@ class _Walker:
             return self.units[expr]
         if expr.is_number:
             return None if expr.is_zero or expr.is_infinite else ONE
-        if expr == dynamicsymbols._t:
+        if expr == TIME:
             return SECOND
-        if expr.is_Symbol or (isinstance(expr, AppliedUndef) and expr.args == (dynamicsymbols._t,)):
+        if expr.is_Symbol or (isinstance(expr, AppliedUndef) and expr.args == (TIME,)):
             self.report(
                 f"{plain(expr)!r} is neither coordinate, parameter nor input: declare it with its unit"
             )

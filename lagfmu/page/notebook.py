@@ -8,7 +8,8 @@ from typing import Any
 
 import sympy as sp
 
-from ..mechanics.equations import EquationsOfMotion, derive
+from ..mechanics.derive import derive
+from ..mechanics.equations import EquationsOfMotion
 from ..mechanics.form import Form
 from ..mechanics.integrability.classify import Classification
 from ..model.model import Model

@@ -12,9 +12,8 @@ from typing import Any
 import sympy as sp
 
 from ..errors import BuildError, ModelError
-from ..mechanics.equations import TIME
 from ..model.closed_form import in_variables
-from ..model.elements import Expr
+from ..model.elements import TIME, Expr
 from ..model.model import Model, Nonholonomic
 from ..model.picture import (
     PIVOTS,

@@ -10,8 +10,9 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from ..mechanics.equations import TIME, EquationsOfMotion
+from ..mechanics.equations import EquationsOfMotion
 from ..mechanics.integrability.classify import Classification, classify
+from ..model.elements import TIME
 from ..model.model import Contact, Nonholonomic, name_of
 from ..names import FORCE, MULTIPLIER, OWN
 from ..numeric.start_priority import OMITTED

@@ -21,11 +21,11 @@ from sympy.printing.pretty.pretty_symbology import greek_unicode
 from sympy.printing.str import StrPrinter
 
 from ..mechanics import simplification
-from ..mechanics.equations import TIME, EquationsOfMotion
+from ..mechanics.equations import EquationsOfMotion
 from ..mechanics.form import Form
 from ..mechanics.formulations.minimal import Reduction
 from ..mechanics.formulations.nullspace import lambda_free, largest_group
-from ..model.elements import Expr, name_of
+from ..model.elements import TIME, Expr, name_of
 from ..model.model import Contact, Nonholonomic
 from ..model.reactions import multiplier
 from ..model.units import SUPERSCRIPT

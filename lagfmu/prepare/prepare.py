@@ -10,8 +10,9 @@ from ..codegen.py.equations import lower as lowered_form
 from ..errors import RequestError
 from ..interface.sensitivities import named
 from ..interface.table import variable_table
-from ..mechanics import equations as mechanics
 from ..mechanics import fold, prune
+from ..mechanics.derive import derive as derive_equations
+from ..mechanics.equations import EquationsOfMotion
 from ..mechanics.form import Form
 from ..mechanics.formulations import minimal
 from ..mechanics.jumps import with_jumps
@@ -27,7 +28,7 @@ from .steps import Prepared as Prepared
 
 
 def prepare(
-    model: Model, scene: Scene | None = None, known: mechanics.EquationsOfMotion | None = None
+    model: Model, scene: Scene | None = None, known: EquationsOfMotion | None = None
 ) -> Prepared:
     """Derive, narrow to the scene, reduce, lower and examine.  Raises ModelError (RequestError for what the
     scene asks for and the model does not have, CannotStartError) or DerivationError.
@@ -45,7 +46,7 @@ def derive(request: Request) -> Derived:
     if problems:
         raise RequestError(request.asked.name, problems)
     if known is None or known.model is not model:
-        known = with_jumps(mechanics.derive(model))
+        known = with_jumps(derive_equations(model))
     return Derived(model, request.asked, known)
 
 

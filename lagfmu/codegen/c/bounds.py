@@ -13,11 +13,11 @@ from collections.abc import Mapping, Sequence
 import sympy as sp
 from sympy.core.relational import Relational
 
-from ...mechanics.equations import TIME, EquationsOfMotion
+from ...mechanics.equations import EquationsOfMotion
 from ...mechanics.jumps import Jumps
 from ...model.attitude import written_out
 from ...model.differential import Differential
-from ...model.elements import Expr
+from ...model.elements import TIME, Expr
 from ...model.model import Constraint, Contact
 
 FUNCTIONS = {

@@ -12,10 +12,10 @@ from typing import Any
 
 import sympy as sp
 
-from ...mechanics.equations import TIME, EquationsOfMotion
+from ...mechanics.equations import EquationsOfMotion
 from ...mechanics.form import Form
 from ...mechanics.jumps import with_switch_states
-from ...model.elements import Expr
+from ...model.elements import TIME, Expr
 from ..parts import Function, Parts, parts_of
 from . import bounds
 from .closed import FUNCTIONS

@@ -7,10 +7,10 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ...mechanics.equations import TIME, EquationsOfMotion
+from ...mechanics.equations import EquationsOfMotion
 from ...mechanics.form import Form
 from ...mechanics.jumps import with_switch_states
-from ...model.elements import Expr
+from ...model.elements import TIME, Expr
 from ...numeric.closed import OPERATIONS
 from ...numeric.cubic import Cubic
 from ...numeric.system import System

@@ -17,10 +17,10 @@ from typing import Any
 import sympy as sp
 
 from ...errors import DerivationError
-from ...model.elements import Expr
+from ...model.elements import TIME, Expr
 from ...model.model import Constraint, Holonomic
 from .. import simplification
-from ..equations import TIME, EquationsOfMotion
+from ..equations import EquationsOfMotion
 
 SMALL = 400  # operations below which a reduced expression is worth simplifying
 

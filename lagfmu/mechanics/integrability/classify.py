@@ -20,11 +20,10 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from sympy import Eq, eye, factor_terms, sympify
-from sympy.physics.mechanics import dynamicsymbols
 
 from ...errors import DerivationError
 from ...model.display import Displayed
-from ...model.elements import Expr
+from ...model.elements import TIME, Expr
 from .forms import Chart, on_surfaces, pfaffian
 from .frobenius import Reduced, closed, curvature, derived_flag, obstruction, rref
 from .integrals import first_integrals
@@ -131,7 +130,7 @@ class _System:
         self, forms: tuple[Expr, ...], coordinates: tuple[Expr, ...], surfaces: tuple[Expr, ...]
     ) -> None:
         self.forms = forms
-        self.all = (*forms, *(f.diff(dynamicsymbols._t) for f in surfaces))
+        self.all = (*forms, *(f.diff(TIME) for f in surfaces))
         rows = [[*a, a0] for a, a0 in (pfaffian(form, coordinates) for form in self.all)]
         self.chart = Chart(coordinates, [entry for row in rows for entry in row])
         self.rows = [[self.chart.there(entry) for entry in row] for row in rows]

@@ -10,10 +10,9 @@ from collections.abc import Sequence
 from typing import Any
 
 from sympy import Dummy, Eq, S, expand, simplify, sympify
-from sympy.physics.mechanics import dynamicsymbols
 
 from ...errors import DerivationError
-from ...model.elements import Expr
+from ...model.elements import TIME, Expr
 from .zero import plain
 
 _SHORT = 60  # operations of a coordinate's value that is put in
@@ -24,14 +23,13 @@ def pfaffian(form: Expr, coordinates: Sequence[Expr]) -> tuple[list[Expr], Expr]
 
     Raises `DerivationError`, which names the term, if the form is not linear in the velocities.
     """
-    time = dynamicsymbols._t
     form = form.lhs - form.rhs if isinstance(form, Eq) else sympify(form)
-    if any(form.has(q.diff(time, 2)) for q in coordinates):
+    if any(form.has(q.diff(TIME, 2)) for q in coordinates):
         raise DerivationError(
             f"constraint {form} has accelerations: a Pfaffian constraint is linear in the "
             "velocities; integrate it once, or leave it to the dynamics"
         )
-    speeds = {q.diff(time): Dummy(f"v{j}") for j, q in enumerate(coordinates)}
+    speeds = {q.diff(TIME): Dummy(f"v{j}") for j, q in enumerate(coordinates)}
     plain = form.xreplace(speeds)
     v = list(speeds.values())
     coefficients = [plain.diff(speed) for speed in v]
@@ -57,7 +55,7 @@ class Chart:
         used: set[Any] = set().union(*(entry.free_symbols for entry in entries))
         names = [str(getattr(q, "func", q)) for q in coordinates]
         self.variables = [Dummy(name, real=True) for name in [*names, "t"]]
-        self._there = dict(zip([*coordinates, dynamicsymbols._t], self.variables, strict=True))
+        self._there = dict(zip([*coordinates, TIME], self.variables, strict=True))
         for symbol in sorted(used - set(self._there), key=str):
             if symbol.is_extended_real is None:
                 self._there[symbol] = Dummy(symbol.name, real=True)
@@ -89,7 +87,7 @@ def on_surfaces(
             kept.append(f)
             continue
         free.remove(q)
-        put = {q.diff(dynamicsymbols._t): value.diff(dynamicsymbols._t)}
+        put = {q.diff(TIME): value.diff(TIME)}
         left, surfaces, kept = (
             [e.xreplace(put).xreplace({q: value}) for e in group]
             for group in (left, surfaces, kept)
@@ -99,6 +97,6 @@ def on_surfaces(
 
 def _is_constant(factor: Expr) -> bool:
     """It depends on parameters alone, and is not zero whatever they are."""
-    if factor.has(dynamicsymbols._t):
+    if factor.has(TIME):
         return False
     return bool(factor.is_Symbol or factor.is_nonzero)

@@ -34,8 +34,8 @@ from ... import names
 from ...fmu.closed_forms import pack_closed_forms
 from ...mechanics.attitudes import angular_velocity
 from ...model.attitude import written_out
-from ...model.closed_form import TIME, ClosedForm, in_variables, output
-from ...model.elements import Constraint, Expr, Tie
+from ...model.closed_form import ClosedForm, in_variables, output
+from ...model.elements import TIME, Constraint, Expr, Tie
 from ...model.model import Contact, Friction, Model, Nonholonomic, name_of
 from ...model.speeds import quaternions
 from ...numeric.closed import across
