@@ -87,6 +87,7 @@ from .numeric.start_priority import GIVEN, OMITTED
 from .numeric.system import System
 from .page.documentation import page as documentation_page
 from .page.documentation import with_figures
+from .page.notation import Notation, name_latex, name_text
 from .page.packed import pack as pack_picture
 from .page.packed import values as picture_values
 from .page.picture import as_bytes, direction, picture_of, read_picture
@@ -94,7 +95,7 @@ from .page.preset import IN_FMU, preset_of, read_preset
 from .page.savings import NATIVE, OPERATIONS, savings
 from .page.table import print_whole
 from .page.text import show as show_in
-from .page.typeset import Notation, name_latex, name_text, typeset
+from .page.typeset import typeset
 from .page.wrapped import wrapped
 from .prepare.consistency import RedundantConstraintWarning
 from .prepare.prepare import Prepared, prepare

@@ -19,8 +19,9 @@ from ..numeric.start_priority import OMITTED
 from ..prepare.consistency import of_undecided, remedy_of
 from ..prepare.steps import Lowered, Prepared
 from .documentation import as_given, shown
+from .notation import Notation
 from .savings import Savings, savings
-from .typeset import Notation, typeset
+from .typeset import typeset
 from .wrapped import wrapped
 
 INDENT = 6
