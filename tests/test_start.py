@@ -153,15 +153,16 @@ def test_changed_parameters_move_omitted_values_first(rod):
     assert np.hypot(at["x"], at["y"]) == pytest.approx(1.5, rel=1e-14)
 
 
-def test_a_model_whose_own_start_contradicts_itself_is_not_built(tmp_path):
+def test_a_model_whose_own_start_contradicts_itself_is_neither_built_nor_simulated(tmp_path):
     """x = 0.5 with theta = 0.3 misses x = l/2 cos(theta) by 0.2 m: both are named with both numbers."""
     prepared = prepare(pinned_rod({theta: 0.3, x: 0.5}))
-    with pytest.raises(ModelError) as refused:
-        write(prepared, tmp_path)
-    text = str(refused.value)
-    assert "start gives theta = 0.3" in text
-    assert "start gives x = 0.5" in text
-    assert "misses the constraints ('pinx' by -0.217 m)" in text
+    for run in (lambda: write(prepared, tmp_path), lambda: simulate(prepared, target="python")):
+        with pytest.raises(ModelError) as refused:
+            run()
+        text = str(refused.value)
+        assert "start gives theta = 0.3" in text
+        assert "start gives x = 0.5" in text
+        assert "misses the constraints ('pinx' by -0.217 m)" in text
     assert not list(tmp_path.iterdir())
 
 

@@ -40,7 +40,7 @@ from ..model.scene import Scene
 from ..numeric.start_priority import LEFT_OUT
 from ..numeric.tolerance import tolerance_problem
 from ..prepare.prepare import Prepared, prepare
-from ..prepare.starts import tell
+from ..prepare.starts import check_given, tell
 from .reference import Driven, driven
 from .result import Result
 
@@ -86,8 +86,8 @@ def simulate(
     `error.NAME` beside them (docs/error_bars.md), as those of an FMU have that was built with them.
 
     Warns of each start value that is moved onto the constraints (starts.py), and of what the FMU itself warns
-    of.  Raises ModelError for a model that cannot start, SimulationError if a step fails, and
-    VerificationError for a file that is no FMU.
+    of.  Raises ModelError for a model that cannot start, or not as its own `start` says, SimulationError if a
+    step fails, and VerificationError for a file that is no FMU.
     """
     for what, number in (("stop_time", stop_time), ("step_size", step_size)):
         if number is not None and not 0 < number < np.inf:
@@ -134,7 +134,8 @@ class _Asked:
 
 
 def _of_model(prepared: Prepared, target: str, asked: _Asked) -> Result:
-    name = prepared.scene.name
+    name, structure = prepared.scene.name, prepared.structure
+    check_given(prepared.model.name, structure.start.moved, structure.missed)
     if target == PYTHON:
         from ..fmu.inprocess import InProcess  # and with it the solver, which no native FMU needs
 
