@@ -7,6 +7,9 @@ from math import cos, hypot, sin
 import pytest
 from instance import instance
 
+from lagfmu import simulate
+from lagfmu.testing import StartMovedWarning
+
 ALONG, LENGTH = cos(0.5) + 2 * sin(0.5), hypot(0.6, 0.9)
 MOVED = {  # FMU, what is set, and where it starts
     "the other mass follows": ("Atwood", {"x1": 0.3}, {"x1": 0.3, "x2": -0.3}),
@@ -47,3 +50,25 @@ def test_a_start_that_misses_the_constraints_is_moved_onto_them(native_fmu, case
         starts = {n: one.variables[n].start for n in expected}
     before = {n: float(x) for n, x in (starts | values).items() if x is not None}
     assert told == {n for n in found.keys() & before.keys() if found[n] != before[n]}
+
+
+@pytest.mark.filterwarnings("ignore::lagfmu.testing.StartMovedWarning")
+@pytest.mark.parametrize(
+    ("name", "variable", "asked", "reach"),
+    [
+        ("PendulumCartesian", "x", 1.5, 1.0),
+        ("PendulumCartesian", "y", -3.0, -1.0),
+        ("Door", "door.position.x", -1.0, -0.4),
+        ("SliderCrankBodies", "piston.position.x", 5.0, 0.7),
+    ],
+)
+def test_a_value_beyond_reach_is_moved_to_about_as_far_as_it_reaches(
+    fmu, name, variable, asked, reach
+):
+    """A bob farther out than its rod is long, a door's middle farther from its hinges than half its width, a
+    piston beyond crank and rod: each begins on the constraints, in the direction that was asked for."""
+    with pytest.warns(StartMovedWarning, match=f"start value {variable} = {asked}"):
+        run = simulate(fmu(name), 1e-4, 1e-4, start_values={variable: asked})
+    assert reach * run[variable][0] > 0
+    assert 0.9 * abs(reach) < abs(run[variable][0]) <= (1 + 1e-12) * abs(reach)
+    assert max(abs(run[n][0]) for n in run.dtype.names if n.startswith("residual")) < 1e-14

@@ -2,7 +2,9 @@
 
 Omitted values move first, then those given in the model, then those that the importer set; a priority moves
 only if the lower ones cannot reach the constraints alone, and each stage begins at the values as they were
-given.  With a stage's coordinates free and the others held, a projection onto G dq = c is
+given.  The last one holds higher priorities but gently: beside a value beyond reach that is held firmly, the
+others are led to where they move the constraint no more, and no step is left.  With a stage's coordinates
+free and the others held, a projection onto G dq = c is
 
     (W M W) dq = G_free^T mu ,   G_free dq = c
 
@@ -34,6 +36,7 @@ from .thresholds import (
     INITIAL_NEAR,
     INITIAL_SWEEPS,
     PRIORITY_EASE,
+    PRIORITY_GENTLY,
 )
 
 EPS = float(np.finfo(float).eps)
@@ -80,6 +83,12 @@ def stages(priority: Sequence[int]) -> Iterator[Stage]:
             yield Stage(highest, of, free, np.where(free, PRIORITY_EASE**below, 1.0))
 
 
+def gently(priority: Sequence[int]) -> Stage:
+    """The last stage, in which all may move."""
+    of = np.array(priority, dtype=int)
+    return Stage(SET, of, np.full(len(of), True), PRIORITY_GENTLY ** (SET - of))
+
+
 def initial_positions(
     at: Instant,
     q0: Vector,
@@ -100,7 +109,8 @@ def initial_positions(
         return q0
     priority = [GIVEN] * system.nq if priority is None else priority
     missed = np.zeros(len(fixed))
-    for stage in stages(_of_speeds(system, priority)):
+    moves = _of_speeds(system, priority)
+    for stage in (*stages(moves), gently(moves)):
         q, missed = _newton(at, q0, v0, fixed, size, stage)
         if not missed.any():
             return q
@@ -111,8 +121,8 @@ def initial_positions(
     )
     values = ", ".join(f"{n} = {x!r}" for n, x in zip(system.coordinates, q0.tolist(), strict=True))
     raise StartFailureError(
-        f"the start values {values} cannot be projected onto the constraints (missed: {violated}): "
-        "choose start values near a configuration that satisfies them, or other parameters"
+        "the start values cannot be projected onto the constraints: choose some near a configuration that "
+        f"satisfies them, or other parameters (missed: {violated}; start values: {values})"
     )
 
 

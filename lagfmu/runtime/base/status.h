@@ -13,10 +13,10 @@ typedef struct {
     char text[WHY_LENGTH];
 } Why;
 
-/* Writes the cause (printf's format, cut to the buffer) and returns FAILED. */
+/* Writes the cause (printf's format, cut to the buffer with dots at its end) and returns FAILED. */
 SHARED Status fail(Why *why, const char *format, ...);
 
-/* Appends to the cause, cut to the buffer. */
+/* Appends to the cause, cut likewise. */
 SHARED void why_append(Why *why, const char *format, ...);
 
 #endif

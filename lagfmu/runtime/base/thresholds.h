@@ -21,7 +21,8 @@ static const double HIDES = 1e-3;         /* ... of which it has at least this p
 enum { INITIAL_ITERATIONS = 60, INITIAL_SWEEPS = 3 }; /* of velocities: the second removes rounding of the first */
 static const double INITIAL_NEAR = 1e-5; /* from here the angles between dependent rows tell how far off it is */
 static const double INITIAL_ARRIVED = 1e3 * DBL_EPSILON; /* slip, relative to its terms, that rounding may leave */
-static const double PRIORITY_EASE = 0x1p-15; /* weight of a start value's rank below those that a stage frees */
+static const double PRIORITY_EASE = 0x1p-15; /* weight of a start value's rank below those that a stage frees, ... */
+static const double PRIORITY_GENTLY = 0.25;  /* ... and in the last stage, for values beyond reach */
 static const double LARGEST_ANGLE = 1e-3 * 0x1p52; /* [rad] neighbouring doubles are 1e-3 apart */
 static const double SMALLEST_TOLERANCE = 1e-14; /* of a step, relative: less is rounding, ... */
 static const double LARGEST_TOLERANCE = 0.1; /* ... and from 0.7 on steps go through contacts unseen */

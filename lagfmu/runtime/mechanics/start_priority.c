@@ -39,14 +39,15 @@ int priority_rows(const System *s, const Priority *priority, int stage, const in
 }
 
 static double weight(Priority priority, int stage, double ease) {
-    if ((int)priority >= stage) return 1;
+    if (priority == SET || (int)priority >= stage) return 1;
     return priority == OMITTED ? ease * ease : ease;
 }
 
 Status priority_nearest(Mechanism *b, const Priority *priority, int stage, const int *own,
                           const double *c) {
     const System *s = b->system;
-    const double ease = b->linear.dense != NULL ? PRIORITY_EASE : LITTLE_EASE;
+    const double firmly = b->linear.dense != NULL ? PRIORITY_EASE : LITTLE_EASE;
+    const double ease = stage < PRIORITIES ? firmly : PRIORITY_GENTLY;
     double *held = b->dq;
     for (int j = 0; j < s->nv; j++) held[j] = 0;
     for (int e = 0; e < s->entries; e++)

@@ -15,6 +15,8 @@ enum { PRIORITIES = 3 };
  * speeds. */
 SHARED void priority_moves(const System *s, const Priority *coordinates, Priority *moves);
 
+/* A stage is a priority; the one after the last, PRIORITIES, frees all, and holds the higher ones but gently. */
+
 /* The first priority from `stage` on that a coordinate has, of `priority` (nv); PRIORITIES if there is none. */
 SHARED int priority_stage(const System *s, const Priority *priority, int stage);
 

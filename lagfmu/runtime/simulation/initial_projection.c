@@ -4,7 +4,9 @@
  *                                  Nonlinear Problems, sect. 3.1), the step halved until |f| falls
  *   M dv = G^T mu ,  G dv = nu - G v
  *
- * of the coordinates that are free in a stage; each stage begins at the start values as they were given. */
+ * of the coordinates that are free in a stage; each stage begins at the start values as they were given.  The last
+ * one holds higher priorities but gently: beside a value beyond reach that is held firmly, the others are led to where
+ * they move the constraint no more, and no step is left. */
 #include "initial_projection.h"
 
 #include <float.h>
@@ -60,19 +62,18 @@ static Status cannot_be_projected(const Start *x, const int *rows, const double 
     const System *s = x->s->system;
     Why *why = &x->s->why;
     const char *comma = "";
-    fail(why, "the start values ");
-    for (int j = 0; j < s->nq; j++) {
-        Digits given = digits(x->q0[j]);
-        why_append(why, "%s%s = %s", j > 0 ? ", " : "", s->coordinates[j], given.text);
-    }
-    why_append(why, " cannot be projected onto the constraints (missed: ");
+    fail(why, "the start values cannot be projected onto the constraints: choose some near a configuration that "
+              "satisfies them, or other parameters (missed: ");
     for (int k = 0; k < s->m; k++)
         if (rows[k] && !(fabs(f[k]) <= allowed[k])) {
             why_append(why, "%s'%s' by %.3g", comma, s->rows[k].name, f[k]);
             comma = ", ";
         }
-    why_append(why, "): choose start values near a configuration that satisfies them, or other "
-                    "parameters");
+    for (int j = 0; j < s->nq; j++) {
+        Digits given = digits(x->q0[j]);
+        why_append(why, "%s%s = %s", j > 0 ? ", " : "; start values: ", s->coordinates[j], given.text);
+    }
+    why_append(why, ")");
     return FAILED;
 }
 
@@ -180,7 +181,8 @@ Status initial_positions(const Start *x, double *q, int *rows) {
     }
     if (!any) return OK;
     memcpy(given, q, bytes);
-    for (int stage = 0; (stage = priority_stage(s, x->moves, stage)) < PRIORITIES; stage++) {
+    for (int stage = 0; stage <= PRIORITIES; stage++) {
+        stage = priority_stage(s, x->moves, stage);
         memcpy(q, given, bytes);
         if (newton_at_start(x, stage, q, rows) == OK) return OK;
         if (stage == OMITTED && check_all_omissions(x, given, rows) == FAILED) return FAILED;
