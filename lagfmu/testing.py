@@ -54,6 +54,7 @@ from .mechanics.integrability.classify import Kind, pfaffian
 from .mechanics.jumps import jumps_of, with_jumps
 from .model.attitude import Carried, rotation_matrix, written_out
 from .model.differential import Differential
+from .model.dimensions import check_dimension, dimension_of
 from .model.elements import TIME
 from .model.expression import LONGEST_SUM, read_formula, text_of
 from .model.file import ModelFile, load
@@ -64,6 +65,7 @@ from .model.library import known
 from .model.model import name_of
 from .model.named import read_named
 from .model.spline import SplineBase
+from .model.symbols import plain
 from .model.units import (
     ENERGY,
     METRE,
@@ -71,13 +73,10 @@ from .model.units import (
     POWER,
     SECOND,
     Unit,
-    check_dimension,
-    dimension_of,
     generalized_force_unit,
     multiplier_unit,
     parse_quantity,
     parse_unit,
-    plain,
 )
 from .numeric import thresholds
 from .numeric.failure import StepFailureError

@@ -15,6 +15,7 @@ import sympy as sp
 from .. import names
 from ..mechanics.equations import symbols_of
 from ..mechanics.joint_coordinates import start_names
+from ..model.dimensions import dimension_of
 from ..model.elements import Constraint, Expr
 from ..model.model import Contact, Nonholonomic, name_of
 from ..model.selection import select
@@ -24,7 +25,6 @@ from ..model.units import (
     POWER,
     SECOND,
     Unit,
-    dimension_of,
     generalized_force_unit,
     multiplier_unit,
     parse_unit,

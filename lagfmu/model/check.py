@@ -11,6 +11,7 @@ import sympy as sp
 from sympy.core.function import AppliedUndef
 
 from ..names import read
+from .dimensions import check_dimension
 from .elements import TIME, Contact, Expr, ModelFields, Nonholonomic, is_number, name_of
 from .frictions import check_frictions
 from .kinds import check_energy, check_names, check_types
@@ -21,8 +22,8 @@ from .reactions import reaction_units, reactions_in
 from .shapes import unusable_surfaces
 from .speeds import check_rates, check_speeds
 from .spline import Spline, splines_in
-from .symbols import known_symbols, symbols_in, undeclared
-from .units import ENERGY, POWER, Unit, check_dimension, declared_unit, parse_unit, plain
+from .symbols import known_symbols, plain, symbols_in, undeclared
+from .units import ENERGY, POWER, Unit, declared_unit, parse_unit
 
 # of a prescribed motion: inputs too, or from the communication points
 RATES = ("given", "estimated")

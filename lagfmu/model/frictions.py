@@ -12,11 +12,12 @@ from collections.abc import Iterable, Mapping, Sequence
 import sympy as sp
 
 from ..errors import UnitError
+from .dimensions import check_dimension, dimension_of
 from .elements import NAME, TIME, Contact, Expr, Friction, ModelFields, Nonholonomic
 from .norms import norms_of
 from .reactions import multiplier, reactions_in
-from .symbols import undeclared
-from .units import ONE, Unit, check_dimension, dimension_of, parse_unit, plain
+from .symbols import plain, undeclared
+from .units import ONE, Unit, parse_unit
 
 MOST_ROWS = 2  # tangential directions of a surface
 NEWTON = parse_unit("N", "a force")

@@ -33,7 +33,7 @@ from .elements import (
 )
 from .frictions import check_kinds
 from .shapes import of_several_components, unusable
-from .units import plain
+from .symbols import plain
 
 _NO_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")  # XML 1.0, sect. 2.2
 COORDINATE_WORDS = (1, 3)

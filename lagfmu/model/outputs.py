@@ -8,10 +8,11 @@ import sympy as sp
 from sympy.core.function import AppliedUndef
 
 from ..names import MULTIPLIER, read
+from .dimensions import check_dimension
 from .elements import TIME, Contact, Expr, ModelFields, Nonholonomic, Peak, name_of
 from .reactions import force_of_constraint, multiplier, reaction_units, reactions_in
-from .symbols import known_symbols, undeclared
-from .units import Unit, check_dimension, declared_unit, plain
+from .symbols import known_symbols, plain, undeclared
+from .units import Unit, declared_unit
 
 HIGHEST = 2  # order of a derivative
 

@@ -17,8 +17,9 @@ from sympy.core.function import AppliedUndef
 
 from ..errors import UnitError
 from ..names import FORCE, MULTIPLIER, REACTIONS, name, read
+from .dimensions import dimension_of
 from .elements import Expr, ModelFields, Nonholonomic, name_of
-from .units import ONE, SECOND, Unit, dimension_of, generalized_force_unit, multiplier_unit
+from .units import ONE, SECOND, Unit, generalized_force_unit, multiplier_unit
 
 
 def multiplier(constraint: str) -> Expr:

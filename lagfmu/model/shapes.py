@@ -9,7 +9,7 @@ from sympy.physics.vector.dyadic import Dyadic
 from sympy.physics.vector.vector import Vector
 
 from .elements import TIME, Contact, Expr, Holonomic, ModelFields
-from .units import plain
+from .symbols import plain
 
 KINKED = (sp.Abs, sp.sign, sp.Heaviside, sp.Max, sp.Min, sp.floor, sp.ceiling, sp.Mod)
 MOST = 400  # operations of an f that is looked at as a product

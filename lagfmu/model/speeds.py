@@ -14,8 +14,10 @@ import sympy as sp
 from sympy.core.function import AppliedUndef
 
 from .differential import Differential
+from .dimensions import check_dimension
 from .elements import Expr, ModelFields
-from .units import Unit, check_dimension, plain
+from .symbols import plain
+from .units import Unit
 
 
 def quaternions(model: ModelFields) -> list[tuple[Expr, Expr, Expr, Expr]]:

@@ -8,7 +8,6 @@ import sympy as sp
 from sympy.core.function import AppliedUndef
 
 from .elements import TIME, Expr, ModelFields, name_of
-from .units import plain
 
 
 def known_symbols(model: ModelFields) -> set[Expr]:
@@ -50,3 +49,18 @@ def symbols_in(expression: Expr) -> set[Expr]:
     e = sp.sympify(expression)
     found: set[Expr] = e.free_symbols | e.atoms(AppliedUndef)
     return found
+
+
+def plain(expr: Expr) -> str:
+    """The expression as text: r for r(t), der(r) and der(r,2) for its derivatives."""
+    expr = sp.sympify(expr)
+    names: dict[Expr, Expr] = {}
+    for node in expr.atoms(sp.Derivative):
+        order = sum(int(count) for _, count in node.variable_count)
+        wrt = [plain(v) for v, _ in node.variable_count if v != TIME]
+        tail = [plain(node.expr), *wrt, *([str(order)] if order > 1 else [])]
+        names[node] = sp.Symbol(f"der({','.join(tail)})")
+    for node in expr.atoms(AppliedUndef):
+        if len(node.args) == 1 and node.args[0].is_Symbol:
+            names[node] = sp.Symbol(node.func.__name__)
+    return str(expr.xreplace(names))

@@ -1,4 +1,4 @@
-"""Units in coherent SI, and the dimensional analysis of SymPy expressions.
+"""Units in coherent SI.
 
 Pint reads the unit strings; a `Unit` keeps its exponents over the SI base and a Modelica name.
 The radian is carried apart (FMI has it as a base unit) and counts as dimensionless.
@@ -8,24 +8,15 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
 from typing import Any
 
 import pint
-import sympy as sp
-from sympy.core.function import AppliedUndef
-from sympy.functions.elementary.hyperbolic import HyperbolicFunction, InverseHyperbolicFunction
-from sympy.functions.elementary.trigonometric import (
-    InverseTrigonometricFunction,
-    TrigonometricFunction,
-)
 
 from ..errors import UnitError
-from .attitude import Attitude, Carried
-from .elements import TIME, Expr
 
 BASE = ("kg", "m", "s", "A", "K", "mol", "cd")
 SUPERSCRIPT = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
@@ -43,11 +34,12 @@ def _base_units(symbol: str) -> tuple[float, dict[str, Fraction]]:
     """The factor of a unit symbol to SI, and its exponents over the SI base and rad."""
     factor, base = _REGISTRY.get_base_units(symbol)
     powers = _REGISTRY.parse_units_as_container(str(base))
-    short = {_REGISTRY.get_symbol(name): _fraction(power) for name, power in powers.items()}
+    short = {_REGISTRY.get_symbol(name): fraction(power) for name, power in powers.items()}
     return float(str(factor)), {name: p for name, p in short.items() if name in (*BASE, "rad")}
 
 
-def _fraction(power: Any) -> Fraction:
+def fraction(power: Any) -> Fraction:
+    """An exponent as the fraction that was meant."""
     return Fraction(power).limit_denominator(1000)
 
 
@@ -224,7 +216,7 @@ def parse_scaled(text: str, what: str) -> DisplayUnit:
         )
     try:
         container = _REGISTRY.parse_units_as_container(marked.replace("^", "**"), as_delta=False)
-        powers = {name: _fraction(power) for name, power in container.items()}
+        powers = {name: fraction(power) for name, power in container.items()}
     except Exception as error:  # pint lets the errors of its tokenizer and evaluator through
         raise UnitError(f"{given}, which is not a unit; {expected}: correct the unit") from error
     if "number_meter" in powers:  # pint's textile unit
@@ -267,7 +259,7 @@ def parse_quantity(text: str, unit: Unit, what: str) -> float:
     read = parse_scaled(found[2], what)
     if not read.unit.same_dimension(unit):
         raise UnitError(
-            f"{what} = {text!r} has unit {_shown(read.unit)}, expected {_shown(unit)}: correct the unit"
+            f"{what} = {text!r} has unit {in_words(read.unit)}, expected {in_words(unit)}: correct the unit"
         )
     return read.to_si(float(found[1]))
 
@@ -284,7 +276,7 @@ def multiplier_unit(constraint_unit: Unit, nonholonomic: bool) -> Unit:
     for known, force in ((ONE, FORCE * METRE), (METRE, FORCE), (METRE**2, FORCE / METRE)):
         if unit.same_dimension(known):
             return force
-    return ENERGY / _without_rad(unit)
+    return ENERGY / without_rad(unit)
 
 
 def generalized_force_unit(coordinate_unit: Unit) -> Unit:
@@ -292,227 +284,14 @@ def generalized_force_unit(coordinate_unit: Unit) -> Unit:
     return multiplier_unit(coordinate_unit, False)
 
 
-def _without_rad(unit: Unit) -> Unit:
+def without_rad(unit: Unit) -> Unit:
+    """The same of lengths along an arc: m for m.rad."""
     return _merged((unit.name, Fraction(1)), ("rad", Fraction(-unit.rad)))
 
 
-def plain(expr: Expr) -> str:
-    """The expression as text: r for r(t), der(r) and der(r,2) for its derivatives."""
-    expr = sp.sympify(expr)
-    names: dict[Expr, Expr] = {}
-    for node in expr.atoms(sp.Derivative):
-        order = sum(int(count) for _, count in node.variable_count)
-        wrt = [plain(v) for v, _ in node.variable_count if v != TIME]
-        tail = [plain(node.expr), *wrt, *([str(order)] if order > 1 else [])]
-        names[node] = sp.Symbol(f"der({','.join(tail)})")
-    for node in expr.atoms(AppliedUndef):
-        if len(node.args) == 1 and node.args[0].is_Symbol:
-            names[node] = sp.Symbol(node.func.__name__)
-    return str(expr.xreplace(names))
-
-
-def check_dimension(
-    expr: Expr, expected: Unit | None, units: Mapping[Expr, Unit], what: str
-) -> list[str]:
-    """The dimensional problems of `expr`, [] if there are none.  With `expected` None only the terms must
-    agree.  A symbol without a unit is a problem."""
-    walker = _Walker(units, what)
-    unit = walker.walk(sp.sympify(expr), expected)
-    if unit is not None and expected is not None and not unit.same_dimension(expected):
-        walker.report(
-            f"{_short(expr)!r} has unit {_shown(unit)}, expected {_shown(expected)}: "
-            + _remedy([sp.sympify(expr)], [unit])
-        )
-    return list(walker.problems)
-
-
-def dimension_of(expr: Expr, units: Mapping[Expr, Unit], what: str) -> Unit | None:
-    """The unit of `expr`, None if it is identically zero; UnitError if its dimensions disagree."""
-    walker = _Walker(units, what)
-    unit = walker.walk(sp.sympify(expr), None)
-    if walker.problems:
-        raise UnitError("\n".join(walker.problems))
-    return unit
-
-
-def _short(expr: Expr) -> str:
-    text = plain(expr)
-    return text if len(text) <= 120 else f"{text[:117]}..."
-
-
-def _shown(unit: Unit) -> str:
+def in_words(unit: Unit) -> str:
     """The name for a message: no rad beside kg or m, and the base units behind a derived name."""
     if unit.exponents[0] or unit.exponents[1]:
-        unit = _without_rad(unit)
+        unit = without_rad(unit)
     base = _unit(dict(zip((*BASE, "rad"), (*unit.exponents, Fraction(unit.rad)), strict=True)))
     return unit.name if unit.name == base.name else f"{unit.name} = {base.name}"
-
-
-def _remedy(terms: Sequence[Expr], found: Sequence[Unit]) -> str:
-    if any(term.is_number for term in terms):
-        return "write the number as a Parameter with a unit"
-    if any(unit.dimensionless for unit in found):
-        return "add the missing factor; a number with a dimension must be a Parameter with a unit"
-    return "add the missing factor, or correct the unit of one of its symbols"
-
-
-# Functions of a dimensionless argument, and those that keep the dimension of their arguments.
-_PURE = (
-    *(TrigonometricFunction, InverseTrigonometricFunction, HyperbolicFunction),
-    *(InverseHyperbolicFunction, sp.exp, sp.log, sp.floor, sp.ceiling, sp.erf),
-)
-_KEEPING = (sp.Abs, sp.Max, sp.Min, sp.Mod, sp.re, sp.conjugate)
-
-
-class _Walker:
-    """Walks an expression and collects its dimensional problems; None stands for any dimension."""
-
-    def __init__(self, units: Mapping[Expr, Unit], what: str) -> None:
-        self.units, self.what = units, what
-        self.problems: dict[str, None] = {}  # ordered, each once
-
-    def report(self, problem: str) -> None:
-        self.problems.setdefault(f"{self.what}: {problem}")
-
-    def walk(self, expr: Expr, expected: Unit | None = None) -> Unit | None:
-        if expr in self.units:
-            return self.units[expr]
-        if expr.is_number:
-            return None if expr.is_zero or expr.is_infinite else ONE
-        if expr == TIME:
-            return SECOND
-        if expr.is_Symbol or (isinstance(expr, AppliedUndef) and expr.args == (TIME,)):
-            self.report(
-                f"{plain(expr)!r} is neither coordinate, parameter nor input: declare it with its unit"
-            )
-            return None
-        if expr.is_Add or isinstance(expr, _KEEPING):
-            return self._agree(expr.args, expected, expr)
-        if expr.is_Mul:
-            return self._product(expr.args, expected)
-        if expr.is_Pow:
-            return self._power(expr)
-        if isinstance(expr, sp.Derivative):
-            unit = self.walk(expr.expr)
-            for variable, count in expr.variable_count:
-                below = self.walk(variable)
-                unit = None if unit is None or below is None else unit / below ** int(count)
-            return unit
-        if isinstance(expr, sp.Piecewise):
-            for _, condition in expr.args:
-                self._condition(condition)
-            return self._agree([value for value, _ in expr.args], expected, expr)
-        if hasattr(expr, "spline"):
-            return self._spline(expr)
-        if isinstance(expr, sp.atan2):
-            self._agree(expr.args, None, expr)
-        elif isinstance(expr, Attitude):
-            self._pure(expr.quaternion, "quaternion", expr)
-        elif isinstance(expr, Carried):
-            return self._carried(expr)
-        elif isinstance(expr, (sp.sign, sp.Heaviside)):
-            self.walk(expr.args[0])
-        elif isinstance(expr, _PURE):
-            self._pure(expr.args, "argument", expr)
-        else:
-            self.report(
-                f"unknown function {expr.func.__name__!r} in {plain(expr)!r}, whose dimension "
-                "cannot be told: write it in elementary functions"
-            )
-            return None
-        return ONE
-
-    def _carried(self, expr: Carried) -> Unit | None:
-        """The unit of the vector, times that of w in each order."""
-        order, _, e, s, w = expr.parts
-        self._pure(e, "quaternion", expr)
-        unit, rate = self._agree(s, None, expr), self._agree(w, None, expr) if order else ONE
-        return None if unit is None or rate is None else unit * rate**order
-
-    def _spline(self, expr: Expr) -> Unit:
-        """A table's value, or [y]/[x]^k of its derivative; its argument has the unit of its x."""
-        spline, order = expr.spline, expr.order
-        unit = self.walk(expr.args[0], spline.x_unit)
-        if unit is not None and not unit.same_dimension(spline.x_unit):
-            self.report(
-                f"the argument of {plain(expr)!r} has unit {_shown(unit)}, expected "
-                f"{_shown(spline.x_unit)} as the table {spline.name!r} has: correct one of them"
-            )
-        found: Unit = spline.y_unit / spline.x_unit**order if order else spline.y_unit
-        return found
-
-    def _pure(self, args: Iterable[Expr], role: str, whole: Expr) -> None:
-        for arg in args:
-            unit = self.walk(arg, ONE)
-            if unit is not None and not unit.dimensionless:
-                self.report(
-                    f"the {role} of {plain(whole)!r} has unit {_shown(unit)}, "
-                    "expected a dimensionless one: divide it by a Parameter of that unit"
-                )
-
-    def _condition(self, condition: Expr) -> None:
-        if condition.is_Relational:
-            self._agree(condition.args, None, condition)
-        else:
-            for arg in condition.args:
-                self._condition(arg)
-
-    def _product(self, args: Sequence[Expr], expected: Unit | None) -> Unit | None:
-        """The product; what is expected of it tells what a sum among the factors must be."""
-        product: Unit | None = ONE
-        sums = [arg for arg in args if arg.is_Add]
-        for arg in (*(arg for arg in args if not arg.is_Add), *sums):
-            hint = None
-            if [arg] == sums and expected is not None and product is not None:
-                hint = expected / product
-            unit = self.walk(arg, hint)
-            product = None if unit is None or product is None else product * unit
-        return product
-
-    def _power(self, expr: Expr) -> Unit | None:
-        base, exponent = self.walk(expr.base), expr.exp
-        if not exponent.is_number:
-            self._pure([exponent], "exponent", expr)
-        if base is None:
-            return None
-        if exponent.is_Rational or (exponent.is_Float and not base.dimensionless):
-            return base ** _fraction(str(exponent))
-        if not base.dimensionless:
-            self.report(
-                f"the base of {plain(expr)!r} has unit {_shown(base)}, expected a dimensionless "
-                "one under an exponent that is no plain number: divide it by a Parameter of that "
-                "unit"
-            )
-        return ONE if base.dimensionless else None
-
-    def _agree(self, terms: Sequence[Expr], expected: Unit | None, whole: Expr) -> Unit | None:
-        """The common unit of `terms`; the offenders differ from `expected` or the majority."""
-        groups: dict[tuple[Fraction, ...], list[tuple[Expr, Unit]]] = {}
-        for term in terms:
-            unit = self.walk(term, expected)
-            if unit is not None:
-                groups.setdefault(unit.exponents, []).append((term, unit))
-        if not groups:
-            return None
-        if len(groups) == 1:
-            units = [unit for _, unit in next(iter(groups.values()))]
-            # y - R*theta is a length, whichever of its terms comes first
-            return _without_rad(units[0]) if len({u.rad for u in units}) > 1 else units[0]
-
-        def rank(key: tuple[Fraction, ...]) -> tuple[bool, bool, int]:
-            numbers = all(term.is_number for term, _ in groups[key])
-            return expected is not None and key == expected.exponents, not numbers, len(groups[key])
-
-        first, second, *_ = sorted(groups, key=rank, reverse=True)
-        right = groups.pop(first) if rank(first) > rank(second) else []
-        offenders = [pair for group in groups.values() for pair in group]
-        named = " and ".join(f"{plain(term)!r} (unit {_shown(unit)})" for term, unit in offenders)
-        remedy = _remedy([term for term, _ in offenders], [unit for _, unit in offenders])
-        if right:
-            agreed = expected if expected and first == expected.exponents else right[0][1]
-            noun = "term" if len(offenders) == 1 else "terms"
-            problem = f"{noun} {named} must have unit {_shown(agreed)} like the rest"
-        else:
-            problem = f"the terms {named} differ in dimension"
-        self.report(f"{problem} in {_short(whole)!r}: {remedy}")
-        return None
