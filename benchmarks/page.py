@@ -28,7 +28,8 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder, chromium() as browser:
         for file in files:
             path = write_page(file, Path(folder, f"{file.stem}.html"))
-            page = Page(browser, path, viewport={"width": 1280, "height": 900})
+            page = Page(browser, viewport={"width": 1280, "height": 900})
+            page.goto(path)
             page.until("lagfmu.runs")
             page.tab.wait_for_timeout(1500)
             script = (
@@ -48,7 +49,7 @@ def main() -> None:
             size = path.stat().st_size / 1e3
             median, slowest = statistics.median(times), max(times)
             print(f"{file.stem:20} {size:5.0f} {paint:9.0f} {median:10.0f} {slowest:11.0f}")
-            page.close()
+            page.context.close()
 
 
 if __name__ == "__main__":
