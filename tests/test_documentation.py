@@ -130,6 +130,8 @@ def test_names_are_written_as_in_the_textbook():
     assert name_latex("mu_rel") == r"\mu_{\mathrm{rel}}"
     assert name_text("theta0") == "θ₀"
     assert name_text("slide", 2) == "der(slide,2)"
+    assert name_text("crank.position.x") == "x_crank"
+    assert name_text("jack.position") == "jack.position"  # the input of a motor in a slide
 
 
 def test_markup_in_descriptions_is_shown_as_it_stands(text):

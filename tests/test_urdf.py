@@ -55,6 +55,24 @@ def test_an_inertia_in_turned_axes_is_turned_into_those_of_the_link() -> None:
     assert yz == pytest.approx(c * s * (0.0019 - 0.0012))
 
 
+def test_the_damping_of_a_file_makes_a_mechanism(tmp_path: Path) -> None:
+    """<dynamics damping> turns by -c der(angle), in a slide it pushes by -c der(position)."""
+    damped = '<dynamics damping="2"/>', '<dynamics damping="3"/>'
+    turns, slides = (
+        joint("j", "base", "a", more=damped[0]),
+        joint("s", "a", "b", "prismatic", damped[1]),
+    )
+    read = from_urdf(robot(tmp_path, BASE, *map(link, "ab"), turns, slides))
+    model = mechanism("R", bodies=read.bodies, joints=read.joints, loads=read.loads)
+    units = {
+        str(p.symbol): (p.value, p.unit) for p in model.parameters if "damping" in str(p.symbol)
+    }
+    assert units == {
+        "j_damper.damping": (2.0, "N.m.s/rad"),
+        "s_damper.damping": (3.0, "N.s/m"),
+    }
+
+
 def test_a_marker_lays_z_along_the_axis_of_the_file() -> None:
     """The axis (0, 0.6, 0.8) of the fifth joint is the third column of both markers' rotations."""
     fifth = from_urdf(ARM).joints[4]

@@ -63,8 +63,8 @@ def _parts(name: str) -> tuple[str, tuple[str, ...]]:
     """theta0 -> theta, (0,); mu_s -> mu, (s,); crank.position.x -> x, (crank,); crank.inertia.xx -> J,
     (xx, crank); a name of another form is one word."""
     body, *words = name.split(".")
-    if words and words[0] in OF_BODIES:
-        letters = [w for w in (OF_BODIES[words[0]], *words[1:]) if w]
+    letters = [w for w in (OF_BODIES.get(words[0], ""), *words[1:]) if w] if words else []
+    if letters and words[0] in OF_BODIES:
         return letters[0], (*letters[1:], body)
     match = PARTS.match(name)
     if match is None:
