@@ -517,7 +517,7 @@ def test_an_overhung_wheel_is_braked_by_the_edges_of_its_bearing_and_by_its_shou
     wheel = Body("wheel", mass=2.0, inertia=(0.01, 0.01, 0.02))
     pin = {"friction": 0.2, "radius": 0.01, "length": 0.1}
     joint = Revolute("A", Base().at((0, 0, 0)), wheel.at((0, 0, -0.3)), **pin)
-    weight, start = [Gravity((0, -6.0, -8.0))], {"der(angle.A)": 5.0}
+    weight, start = [Gravity((3.6, -4.8, -8.0))], {"der(angle.A)": 5.0}
     model = mechanism("Wheel", bodies=[wheel], joints=[joint], loads=weight, start=start)
     run = simulate(model, 0.2, 0.1, 1e-10)
     slowing = 0.2 * 0.01 * (6.0 * 12.0 + 16.0) / 0.02

@@ -24,11 +24,12 @@ def norms_of(normal: Expr) -> tuple[Norm, ...] | None:
     What is linear in the multipliers, and what has none, is a norm of one component.
     """
     normal = sp.sympify(normal)
-    if _is_linear(normal):
-        return ((normal,),)
-    found = [_norm(term) for term in sp.Add.make_args(sp.expand_mul(normal, deep=False))]
-    whole = tuple(n for n in found if n is not None)
-    return whole if len(whole) == len(found) and all(map(_is_linear, sum(whole, ()))) else None
+    if reactions_in(normal):
+        terms = sp.Add.make_args(sp.expand_mul(normal, deep=False))
+        found = tuple(n for n in map(_norm, terms) if n is not None)
+        if len(found) == len(terms) and all(map(_is_linear, sum(found, ()))):
+            return found
+    return ((normal,),) if _is_linear(normal) else None
 
 
 def _is_linear(e: Expr) -> bool:
