@@ -155,14 +155,14 @@ def test_a_rod_without_mass_pulls_along_itself():
     tilted = (sin(0.5), -cos(0.5))
     model = plane(
         bodies=[bob],
-        joints=[Distance("L", ground.at((0, 0)), bob.at((0, 0)), 1.0)],
+        joints=[Distance("L", ground.at((0, 0), rotation=-0.2), bob.at((0, 0)), 1.0)],
         loads=[Gravity((0, -g))],
         start={"bob.position": tilted},
     )
     first = moved(model, stop=0.1)[0]
     pull = 1.5 * g * cos(0.5)
     assert first["lambda.L"] == pytest.approx(-pull, rel=1e-12)
-    expected = [-pull * x for x in tilted]
+    expected = [-pull * sin(0.7), pull * cos(0.7)]  # in the axes of the first marker
     assert [first["force.L.x"], first["force.L.y"]] == pytest.approx(expected, rel=1e-12)
 
 
@@ -328,23 +328,29 @@ def test_forces_and_torques_act_where_they_are_said_to():
 
 
 def test_a_joint_stops_at_its_limits():
-    """A flap of 2 kg falls from the level to its stop at -0.5 rad and rests there on m g d cos(0.5)."""
-    flap = Body("flap", 2.0, 0.05)
+    """Flaps of 2 kg fall from the level to stops at -0.5 and at 0.5 rad and rest there on m g d cos(0.5)."""
+    right, left = Body("right", 2.0, 0.05), Body("left", 2.0, 0.05)
+    hinge = ground.at((0, 0))
     run = moved(
         plane(
-            bodies=[flap],
-            joints=[Revolute("A", ground.at((0, 0)), flap.at((-0.3, 0)), limits=(-0.5, 2.0))],
+            bodies=[right, left],
+            joints=[
+                Revolute("A", hinge, right.at((-0.3, 0)), limits=(-0.5, 2.0)),
+                Revolute("B", hinge, left.at((0.3, 0)), limits=(-2.0, 0.5)),
+            ],
             loads=[Gravity((0, -g))],
         )
     )
     last = run[-1]
-    assert last["contact.A.lower"]
-    assert not last["contact.A.upper"]
-    assert last["angle.A"] == pytest.approx(-0.5, rel=1e-12)
-    assert last["torque.A.z"] == pytest.approx(2 * g * 0.3 * cos(0.5), rel=1e-12)
     J = 0.05 + 2 * 0.3**2
     speed = sqrt(2 * 2 * g * 0.3 * sin(0.5) / J)  # rad/s, by the energy
-    assert last["closing.A.lower.impulse"] == pytest.approx(J * speed, rel=1e-8)
+    for flap, stop, away, sign in (("A", "lower", "upper", 1), ("B", "upper", "lower", -1)):
+        assert last[f"contact.{flap}.{stop}"]
+        assert not last[f"contact.{flap}.{away}"]
+        assert last[f"angle.{flap}"] == pytest.approx(-0.5 * sign, rel=1e-12)
+        torque = sign * 2 * g * 0.3 * cos(0.5)
+        assert last[f"torque.{flap}.z"] == pytest.approx(torque, rel=1e-12)
+        assert last[f"closing.{flap}.{stop}.impulse"] == pytest.approx(J * speed, rel=1e-8)
 
 
 def test_a_wheel_on_a_rough_line_rolls_or_slips():

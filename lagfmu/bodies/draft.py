@@ -163,17 +163,17 @@ class Draft:
     def angle(self, name: str, a: Placed, b: Placed, axis: int) -> Timed:
         """The angle of b about an axis of a.  In space it is a coordinate of its own, tied to the attitude
         modulo 2 pi, where something needs it over many turns."""
-        rates = about(a, b, axis)
+        rate = about(a, b, axis)
         if len(self.components) == 2:
-            return Timed(b.angle - a.angle, *rates)
+            return Timed(b.angle - a.angle, rate, sp.S.Zero)
         j, k = (axis + 1) % 3, (axis + 2) % 3
         x, y, turned = a.axes[j].value, a.axes[k].value, b.axes[j].value
         within_turn = sp.atan2(dot(turned, y), dot(turned, x))
         if name not in self.wound:
-            return Timed(within_turn, *rates)
+            return Timed(within_turn, rate, sp.S.Zero)
         angle = dynamicsymbols(name)
-        self.unwrapped[angle] = rates[0], within_turn
-        return Timed(angle, *rates)
+        self.unwrapped[angle] = rate, within_turn
+        return Timed(angle, rate, sp.S.Zero)
 
     def hold(self, name: str, f: Timed, text: str) -> None:
         """A row f = 0."""

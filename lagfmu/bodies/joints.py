@@ -92,7 +92,7 @@ class Joint:
                 wrench.force[k] += multiplier(f"{self.name}.{x}")
         if len(draft.components) == 2:
             if ("about" if axis == 2 else "across") not in self.turns:
-                self.hold(draft, wrench, 2, Timed(b.angle - a.angle, *about(a, b, 2)))
+                self.hold(draft, wrench, 2, Timed(b.angle - a.angle, about(a, b, 2), sp.S.Zero))
             return
         i, j, k = axis, (axis + 1) % 3, (axis + 2) % 3  # a, b, c: right-handed
         if "across" not in self.turns:

@@ -135,10 +135,10 @@ def between(a: Placed, b: Placed) -> TimedVector:
     return TimedVector(*(minus(v, u) for u, v in zip(a.origin, b.origin, strict=True)))
 
 
-def about(a: Placed, b: Placed, axis: int) -> tuple[Expr, Expr]:
-    """The rate at which b turns about an axis of a [rad/s], and its bend."""
-    e, w = a.axes[axis], b.motion.omega
-    return dot(e.value, w) - dot(a.own_axes[axis], a.motion.spin), dot(e.rate, w)
+def about(a: Placed, b: Placed, axis: int) -> Expr:
+    """The rate at which b turns about an axis of a [rad/s].  Where a joint holds that axis on b, too, it has
+    no bend: e' = w_a x e is square to w_b = w_a + rate e."""
+    return dot(a.axes[axis].value, b.motion.omega) - dot(a.own_axes[axis], a.motion.spin)
 
 
 def distance(a: Placed, b: Placed) -> tuple[Timed, Vector]:
