@@ -55,6 +55,7 @@ struct Method {
     int scratch_matrices;             /* and of watched^2, with as many pivots each, of RADAU5_MOST_STATES at most */
     int last_stage; /* arrays in `dense` before two of a stage at t, its argument and its rate, which
                      * stay as they are; 0: they are not kept */
+    int coarse;                       /* dense() has fewer digits than the step: to search by, not to be read */
     int fixed;                        /* a fixed step that divides the way to t_bound evenly */
     /* One accepted step from integrator->t towards t_bound, never past it.  On success t_old,
      * y_old, f_old, t, y, h_next are new, and dense() answers in [t_old, t]; the dense data may be

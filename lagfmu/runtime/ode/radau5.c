@@ -282,6 +282,7 @@ SHARED_VALUE const Method radau5 = {
     .dense_arrays = 3,
     .scratch_arrays = 13,
     .scratch_matrices = 4,
+    .coarse = 1,
     .step = radau5_step,
     .dense = radau5_dense,
 };

@@ -180,8 +180,12 @@ static void put(Solver *s, double t, const double *y) {
 static Status put_between(Solver *s, double t) {
     const Integrator *i = &s->integrator;
     double *y = s->work_advance;
-    i->method->dense(i, t, y);
-    if (segment_project(s, t, y) != OK) return FAILED;
+    if (i->method->coarse) {
+        if (segment_reach(s, i->t_old, i->y_old, t, y) != OK) return FAILED;
+    } else {
+        i->method->dense(i, t, y);
+        if (segment_project(s, t, y) != OK) return FAILED;
+    }
     put(s, t, y);
     return OK;
 }
