@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 import sympy as sp
+from scipy.linalg import expm
 from sympy.physics.mechanics import dynamicsymbols
 from tops import E, W, chain, reference, top, turning
 
@@ -73,6 +74,53 @@ def test_the_motion_is_that_of_the_rates(turn: float) -> None:
     for name in ("x", "y", "energy.total"):
         if name != "energy.total" or not turn:
             np.testing.assert_allclose(other[name], plain[name], rtol=0, atol=1e-10)
+
+
+def test_a_free_particle_moves_straight_over_a_turntable_that_speeds_up() -> None:
+    """q' = v + b(q, t), where B = 1 and the rate w(t) of the table grows: with the components of the velocity
+    in the room, along the table's axes, as speeds, x + i y = (x0 + v0 t) exp(-i phi), phi' = w."""
+    w, tau = sp.symbols("w tau", positive=True)
+    rate = w * (1 + dynamicsymbols._t / tau)
+    model = Model(
+        "Turntable",
+        coordinates={X: "m", Y: "m"},
+        speeds={R: "m/s", S: "m/s"},
+        kinematics={X: R + rate * Y, Y: S - rate * X},
+        kinetic_energy=m * (R**2 + S**2) / 2,
+        parameters=[
+            Parameter(m, 2.0, "kg"),
+            Parameter(w, 1.5, "rad/s"),
+            Parameter(tau, 0.7, "s"),
+        ],
+        start={X: 1.0, R: 0.3, S: 0.7},
+    )
+    run = simulate(model, target="python", stop_time=2.0, tolerance=1e-11)
+    t = run["time"]
+    back = np.exp(-1.5j * (t + t**2 / 1.4))
+    np.testing.assert_allclose(
+        run["x"] + 1j * run["y"], (1 + (0.3 + 0.7j) * t) * back, rtol=0, atol=1e-9
+    )
+    np.testing.assert_allclose(run["vr"] + 1j * run["vt"], (0.3 + 0.7j) * back, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("lever", [1, 2])
+def test_a_force_may_lag_behind_the_motion(lever: int) -> None:
+    """A coordinate that no speed moves is no direction of motion: m x'' = -k z with z' = (x - z)/tau, whatever
+    the speed x' = lever vr."""
+    tau = sp.Symbol("tau", positive=True)
+    model = Model(
+        "Lagging",
+        coordinates={X: "m", Y: "m"},
+        speeds={R: "m/s"},
+        kinematics={X: lever * R, Y: (X - Y) / tau},
+        kinetic_energy=m * X.diff() ** 2 / 2,
+        forces={R: -lever * k * Y},
+        parameters=[*particle().parameters, Parameter(tau, 0.5, "s")],
+        start={X: 1.0},
+    )
+    run = simulate(model, target="python", stop_time=1.0, tolerance=1e-11)
+    end = expm(np.array([[0, 1, 0], [0, 0, -1.5], [2, 0, -2]])) @ [1, 0, 0]
+    assert [run["x"][-1], run["y"][-1]] == pytest.approx([end[0], end[2]], abs=1e-9)
 
 
 def test_a_force_of_constraint_is_conjugate_to_its_speed() -> None:
@@ -147,6 +195,7 @@ WRONG = {
     "quadratic": ({"kinematics": {X: R * S, Y: S}}, "not affine in the speeds"),
     "idle": ({"kinematics": {X: R}}, "speed vt moves nothing"),
     "unit": ({"kinematics": {X: R, Y: S * k}}, "kinematics of y"),
+    "inertia of what lags": ({"kinematics": {X: R + S, Y: -X * k}}, "the rate of y, which no speed"),
     "too many": ({"kinematics": {X: R + S}}, "no more speeds"),
 }
 

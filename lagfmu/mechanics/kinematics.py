@@ -19,6 +19,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import sympy as sp
+from sympy.polys.matrices import DomainMatrix
+from sympy.polys.matrices.exceptions import DMNonInvertibleMatrixError
 
 from ..model.alike import pattern
 from ..model.differential import Differential
@@ -159,8 +161,8 @@ class Kinematics:
         return found.kind, tuple(numbers.get(self.q[j]) for j in rows)
 
     def _groups(self) -> list[list[int]]:
-        """Speeds that share coordinates in B, or one of which moves what B of another depends on; without
-        those that are rates and meet no other."""
+        """Speeds that share coordinates in B, or one of which moves what B of another or b of its coordinates
+        depends on; without those that are rates and meet no other."""
         plain = {i for i, column in enumerate(self.columns) if list(column.values()) == [sp.S.One]}
         of = {s: j for j, s in enumerate(self.q)}
         kept = [
@@ -173,6 +175,8 @@ class Kinematics:
             for i, column in enumerate(self.columns)
             if i not in plain
         ]
+        drifts = {j: {of[s] for s in self.b[j].free_symbols if s in of} for j in self._drifting}
+        touched += [(set(), {j} | others) for j, others in drifts.items() if others]
         groups: dict[int, tuple[set[int], set[int]]] = {}
         group_of: dict[int, int] = {}  # of each place
         for number, (speeds, places) in enumerate(touched):
@@ -186,7 +190,9 @@ class Kinematics:
 
     @cached_property
     def _drifting(self) -> list[int]:
-        return [j for j, b in enumerate(self.b) if b != 0]
+        """The coordinates with a b: without those that no speed moves, which are no directions of motion."""
+        free = [j for j, row in enumerate(self.rows) if row and j not in self.unwrapped]
+        return [j for j in free if self.b[j] != 0]
 
     def _bracket(self, k: int | None, i: int) -> dict[int, Expr]:
         """[X_k, X_i] by coordinate."""
@@ -241,12 +247,17 @@ def _constant(B: Expr, right: Expr) -> Expr | None:
 
 
 def _symbolic(B: Expr, right: Expr) -> Expr | None:
-    """The c of B c = right by (B^T B)^-1 B^T; None where there is none."""
+    """The c of B c = right, of more rows than columns by (B^T B)^-1 B^T; None where there is none."""
+    if B.is_square:
+        left, over = B, right
+    else:
+        left, over = (B.T * B).applyfunc(sp.factor), B.T * right
+    fields = (DomainMatrix.from_Matrix(part).to_field() for part in (left, over))
     try:
-        left = (B.T * B).applyfunc(sp.factor).inv() * B.T
-    except (sp.matrices.exceptions.NonInvertibleMatrixError, ZeroDivisionError):
+        c = DomainMatrix.lu_solve(*DomainMatrix.unify(*fields)).to_Matrix()
+    except DMNonInvertibleMatrixError:
         return None
-    c = (left * right).applyfunc(lambda e: sp.cancel(sp.trigsimp(e)))
+    c = c.applyfunc(lambda e: sp.cancel(sp.trigsimp(e)))
     return c if _vanishes(B * c - right) else None
 
 

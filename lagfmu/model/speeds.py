@@ -57,6 +57,11 @@ def check_speeds(model: ModelFields, problems: list[str]) -> None:
             problems.append(f"kinematics give {plain(q)}, which is no coordinate of the model")
             continue
         problems += _of_rate(model, q, sp.sympify(expression))
+        if _lags(model, sp.sympify(expression)) and model.energy_expression.has(q.diff()):
+            problems.append(
+                f"the energy holds the rate of {plain(q)}, which no speed moves: give it a speed, and a "
+                "Nonholonomic constraint for what it follows"
+            )
     used = {s for e in model.kinematics.values() for s in sp.sympify(e).atoms(AppliedUndef)}
     problems += [
         f"speed {plain(w)} moves nothing: say in `kinematics` which coordinates move by it"
@@ -83,6 +88,12 @@ def check_speeds(model: ModelFields, problems: list[str]) -> None:
             "an embedding eliminates coordinates whose rates are their speeds: leave out either the "
             "embedding or `kinematics`"
         )
+
+
+def _lags(model: ModelFields, rate: Expr) -> bool:
+    """True of a rate that follows from coordinates alone."""
+    present = rate.atoms(AppliedUndef)
+    return bool(present & model.coordinates.keys()) and not present & model.speeds.keys()
 
 
 def _of_rate(model: ModelFields, q: Expr, rate: Expr) -> Iterator[str]:
