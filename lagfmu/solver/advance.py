@@ -97,7 +97,8 @@ def _scaled(motion: Motion, settings: Settings, state: State, h: float) -> Setti
         span = np.where(span > 0, span, np.abs(v) * h + np.abs(vdot) * h**2 / 2)
         span = np.where(span > 0, span, rows.D * float((span / rows.D).max() or 1.0))
         way = np.abs(motion.system.shift(state.t, q, span, motion.inputs(state.t), motion.p))
-        size = np.where(size > 0, size, way)
+        way = np.maximum(way, np.abs(motion.rate(state.t, q, v)) * h)  # of what no speed moves
+        size = np.where(size > 0, size, np.where(way > 0, way, 1.0))
     return replace(settings, size=tuple(size.tolist()), span=tuple(span.tolist()), rate=rate)
 
 
