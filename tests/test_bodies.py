@@ -689,8 +689,8 @@ pin = Revolute("A", ground.at((0, 0)), arm.at((0, 0)))
             "Revolute 'A': axis is 2, expected 'z' in the plane xy",
         ),
         (
-            {"joints": [Prismatic("D", ground.at((0, 0)), arm.at((0, 0)), friction=(1, 2, 3))]},
-            "friction is (1, 2, 3), expected one coefficient, or the static and the kinetic",
+            {"joints": [Prismatic("D", ground.at((0, 0)), arm.at((0, 0)), friction=[1, 2, 3])]},
+            "friction is [1, 2, 3], expected one coefficient, or the static and the kinetic",
         ),
         (
             {"joints": [Revolute("A", ground.at((0, 0)), arm.at((0, 0)), restitution=0.5)]},

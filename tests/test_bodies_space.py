@@ -460,6 +460,10 @@ arm = Body("arm", 1.0, (0.1, 0.1, 0.1))
             },
             "universal joint 'U' cannot be closed: at the nearest that was found its axes miss being square",
         ),
+        (
+            {"joints": [Spherical("A", ground.at((0, 0, 0)), arm.at((0, 0, 0)), friction=0.1)]},
+            "friction is given, but only Revolute, Prismatic and Cylindrical joints",
+        ),
         ({"start": {"arm.rpy": 0.3}}, "start of 'arm.rpy' is 0.3, expected three numbers: roll"),
         (
             {"start": {"arm.rpy": (0, 0, 1), "arm.orientation.w": 1.0}},

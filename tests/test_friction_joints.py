@@ -224,6 +224,19 @@ def test_a_norm_of_shared_multipliers_is_refused_by_name(tmp_path: Path) -> None
         simulate(pendulum(PIN, mu_s * r, None, *twice), stop_time=0.1, step_size=0.1)
 
 
+def test_hinges_that_share_their_forces_do_not_rub() -> None:
+    """How a door's two hinges share what is across them is not determined: refused, with the remedy."""
+    door = Body("door", mass=20.0, inertia=(1.0, 1.5, 0.6))
+    pin = {"friction": 0.1, "radius": 0.01}
+    hinges = [
+        Revolute(name, Base().at((0, 0, z)), door.at((-0.4, 0, z)), **pin)
+        for name, z in (("top", 1), ("low", -1))
+    ]
+    told = r"'top', 'low'.*not unique.*leave out what is redundant.*or make a hinge Spherical"
+    with pytest.warns(UserWarning, match="follow"), pytest.raises(LagfmuError, match=told):
+        simulate(mechanism("Door", bodies=[door], joints=hinges), stop_time=0.1)
+
+
 def test_a_guide_rubs_by_the_norm_of_its_two_radial_forces(built: Build) -> None:
     """A block thrown up a guide at alpha = 0.5, pressed sideways by P: N = sqrt((m g cos alpha)^2 + P^2); it
     stops after v0/(g sin alpha + mu N/m), slides back by a = g sin alpha - mu N/m, or stays."""

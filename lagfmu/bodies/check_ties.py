@@ -53,7 +53,8 @@ def _of_joint(joint: Joint, planar: bool) -> Iterator[str]:
     if joint.friction is not None and isinstance(joint, Planar):
         yield f"{what}: friction is given, but no force across its axis could press: rub a Contact instead"
     elif joint.friction is not None and not joint.measures:
-        yield f"{what}: friction is given, but it leaves no motion that could rub: leave it out"
+        rubs = "Revolute, Prismatic and Cylindrical joints, PointOnCurve and Contact"
+        yield f"{what}: friction is given, but only {rubs} rub: leave it out"
     elif joint.friction is not None and joint.turns and not value_of(joint.radius):
         yield f"{what}: friction is given without the radius of the pin, expected radius=... in m"
     if joint.length is not None and joint.friction is None:
@@ -97,7 +98,7 @@ def _of_numbers(part: Any) -> Iterator[str]:
         yield f"{what}: radius is {radius!r}, expected a number of at least 0 in m"
     if is_number(restitution) and not 0 <= float(restitution) <= 1:
         yield f"{what}: restitution is {restitution!r}, expected a number from 0 to 1"
-    if isinstance(friction, tuple) and len(friction) != 2:
+    if isinstance(friction, tuple | list) and len(friction) != 2:
         yield f"{what}: friction is {friction!r}, expected one coefficient, or the static and the kinetic"
     if isinstance(part, Gear) and is_number(ratio := value_of(part.ratio)) and float(ratio) == 0:
         yield f"{what}: ratio is 0, expected another number: what does not move is Fixed"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ..model import elements
@@ -25,7 +26,7 @@ class Contact:
     first: Marker
     second: Marker
     radius: Number = 0.0
-    friction: Number | tuple[Number, Number] | None = None
+    friction: Number | Sequence[Number] | None = None
     restitution: Number = 0.0
 
     def add(self, draft: Draft) -> None:

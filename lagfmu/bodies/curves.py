@@ -46,7 +46,7 @@ class PointOnCurve:
     second: Marker
     curve: Track | Spline
     unit: str = "1"
-    friction: Number | tuple[Number, Number] | None = None
+    friction: Number | Sequence[Number] | None = None
 
     def along(self) -> tuple[Sequence[Expr], Expr, tuple[Expr, Expr], str]:
         """The points, their symbol, its first and last value, its unit."""

@@ -144,7 +144,7 @@ class Draft:
 
     def coefficients(self, friction: Any, name: str) -> list[Expr]:
         """One coefficient of friction, or the static and the kinetic one."""
-        given = friction if isinstance(friction, tuple) else (friction,)
+        given = friction if isinstance(friction, tuple | list) else (friction,)
         words = ("friction",) if len(given) == 1 else ("static", "kinetic")
         return [
             self.number(mu, f"{name}.{word}", "1", f"coefficient of friction of {name}, {word}")

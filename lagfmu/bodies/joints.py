@@ -54,7 +54,7 @@ class Joint:
     second: Marker
     axis: str = ""
     limits: Sequence[Number] | None = None
-    friction: Number | tuple[Number, Number] | None = None
+    friction: Number | Sequence[Number] | None = None
     radius: Number = 0.0
     length: Number | None = None
     restitution: Number = 0.0

@@ -135,10 +135,10 @@ def structure_of(posed: Posed) -> Structure:
         )
     several = {f.name for f in full.frictions if len([*chain(*f.norms)]) > 1}
     if refused := [name for name in undecided if name in several]:
-        raise ModelError(eom.model.name, [of_norms(refused, redundant)])
+        raise ModelError(eom.model.name, [of_norms(refused, redundant) + remedy_of(eom)])
     if undecided:
         warnings.warn(
-            f"model {eom.model.name!r}: {of_undecided(undecided, redundant)}",
+            f"model {eom.model.name!r}: {of_undecided(undecided, redundant)}{remedy_of(eom)}",
             RedundantConstraintWarning,
             stacklevel=5,
         )
