@@ -107,7 +107,7 @@ from .study.stress import runs, worker
 from .study.stress.bench import Bench, Finding
 from .study.stress.closed_forms import judged, magnitude
 from .study.stress.facts import facts_of
-from .study.stress.judge import Check
+from .study.stress.judge import Check, sizes_of
 from .study.stress.lagrange import lagrange, lay_beside
 from .study.stress.player import Run, clear
 from .study.stress.player import opened as session_of

@@ -15,6 +15,8 @@ from ..errors import VerificationError
 from ..fmu.read import Trajectory
 from ..model.elements import Expr
 
+SHAKEN = 1e-6  # of a size: a step of differences
+
 
 def function(symbols: Sequence[Expr], expressions: Any) -> Callable[..., Any]:
     """Of numbers in place of the symbols, as sp.lambdify makes one, which goes through all once for each
@@ -46,7 +48,42 @@ class Compiled:
     ) -> NDArray[np.float64]:
         """Its values at `rows` of the run `result`, parameters in `values`; magnitudes below `floors` are
         taken for those.  Raises VerificationError if it uses what the FMU does not have."""
-        known, columns = rows.dtype.names or (), []
+        columns = self._columns(rows, result, values)
+        if floors is not None:
+            columns = {
+                n: np.maximum(np.abs(x), floors[n]) if n in floors else x
+                for n, x in columns.items()
+            }
+        return self._of(columns, len(rows))
+
+    def shaken(
+        self,
+        rows: Trajectory,
+        result: Trajectory,
+        values: Mapping[str, float],
+        sizes: Mapping[str, NDArray[np.float64]],
+    ) -> NDArray[np.float64]:
+        """The sum of |df/dx| size(x) over the columns x in `sizes`, by differences."""
+        columns, count = self._columns(rows, result, values), len(rows)
+        moved = sorted(columns.keys() & sizes.keys())
+        aside = {
+            n: columns[n] + SHAKEN * np.outer(np.arange(len(moved)) == k, sizes[n])
+            for k, n in enumerate(moved)
+        }
+        there, here = self._of(columns | aside, (len(moved), count)), self._of(columns, count)
+        found: NDArray[np.float64] = np.abs(there - here).sum(axis=0) / SHAKEN
+        return found
+
+    def _of(self, columns: Mapping[str, Any], shape: Any) -> NDArray[np.float64]:
+        with np.errstate(all="ignore"):
+            found = np.asarray(self.function(*columns.values()), dtype=float)
+        return np.broadcast_to(found, shape).copy()
+
+    def _columns(
+        self, rows: Trajectory, result: Trajectory, values: Mapping[str, float]
+    ) -> dict[str, Any]:
+        """What stands for the symbols, in their order."""
+        known, columns = rows.dtype.names or (), {}
         for text in map(str, self.symbols):
             inner = names.initially(text)
             if inner in known:
@@ -59,13 +96,8 @@ class Compiled:
                 raise VerificationError(
                     f"closed form {self.name!r} uses {text!r}, which is no output or parameter of the FMU"
                 )
-            column = np.asarray(column, dtype=float)
-            if floors is not None and text in floors:
-                column = np.maximum(np.abs(column), floors[text])
-            columns.append(column)
-        with np.errstate(all="ignore"):
-            found = np.asarray(self.function(*columns), dtype=float)
-        return np.broadcast_to(found, len(rows)).copy()
+            columns[text] = np.asarray(column, dtype=float)
+        return columns
 
 
 def alone(differ: NDArray[np.bool_]) -> NDArray[np.bool_]:

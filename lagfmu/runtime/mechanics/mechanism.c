@@ -28,6 +28,7 @@ void mechanism_layout(Mechanism *b, Arena *arena, const System *s, Why *why,
     b->reach = arena_doubles(arena, s->nv);
     b->place = arena_doubles(arena, s->nv);
     b->trial = arena_doubles(arena, s->nq);
+    b->nearer = arena_doubles(arena, s->nq);
     b->fixed = arena_ints(arena, s->m);
     b->pulls = arena_ints(arena, s->m);
     b->none = arena_ints(arena, s->m);

@@ -52,7 +52,7 @@ struct Mechanism {
     double *vdot, *lambda;          /* of the latest motion(): (nv), (m) */
     unsigned long evaluations;      /* how many there have been: whether a motion is still the latest */
     double *f;                      /* (m) scratch for residuals */
-    double *dq, *trial;             /* (nv), (nq) scratch of project(): what moves, q where it is tried */
+    double *dq, *trial, *nearer;    /* (nv), (nq), (nq) scratch of project(): what moves, q where it is tried, q before */
     double *reach, *place;          /* (nv) scratch: mechanism_reach() and mechanism_place() of all, or at_work() */
     int *fixed;                     /* (m) scratch of project(): position constraints that act, with */
     int *pulls;                     /* (m) those of the basis among them */

@@ -89,6 +89,7 @@ static Status no_arrival(Mechanism *b, Instant at, const Miss *miss, double befo
 /* f = offset on the fixed rows: q is moved, `moved` says whether.  M and G are those of q. */
 static Status project_positions(Mechanism *b, Instant at, double *q, const double *v,
                                 const double *offset, const double *span, int *moved) {
+    const size_t bytes = (size_t)b->system->nq * sizeof *q;
     double before = HUGE_VAL;
     int kept = b->basis != NULL; /* the rows of the basis lead there */
     if (kept) take_basis(b, b->fixed);
@@ -97,9 +98,14 @@ static Status project_positions(Mechanism *b, Instant at, double *q, const doubl
         if (measure(b, at, q, offset, span, &miss) == FAILED) return FAILED;
         *moved = count > 0;
         if (miss.rounding || miss.error < DBL_EPSILON * DBL_EPSILON) return OK;
-        if (miss.error > before / 2 && !kept &&
-            (miss.error < PROJECTION_SMALL || miss.turned < PROJECTION_ROUNDING))
-            return OK; /* rounding in f is left */
+        if (miss.error > before / 2 && !kept) {
+            /* rounding is left: in f, or in the step from a place that was nearer */
+            if (before < PROJECTION_SMALL && miss.error > fmax(before, PROJECTION_ROUNDING)) {
+                memcpy(q, b->nearer, bytes);
+                return OK;
+            }
+            if (miss.error < PROJECTION_SMALL || miss.turned < PROJECTION_ROUNDING) return OK;
+        }
         if (count == PROJECTION_ITERATIONS && miss.error < PROJECTION_ROUNDING) return OK;
         if (count == PROJECTION_ITERATIONS) return no_arrival(b, at, &miss, before);
         const int stale = count > 0 && !(miss.error <= CONTRACTS * before);
@@ -110,6 +116,7 @@ static Status project_positions(Mechanism *b, Instant at, double *q, const doubl
             linear_factor(&b->linear, b->M, b->G, kept ? b->pulls : b->fixed) == FAILED)
             return FAILED;
         if (linear_nearest(&b->linear, NULL, b->f, b->dq, NULL) == FAILED) return FAILED;
+        if (miss.error < PROJECTION_SMALL) memcpy(b->nearer, q, bytes);
         mechanism_move(b, 1, b->dq, q);
         if (mechanism_settle(b, at, q) == FAILED) return FAILED;
         before = miss.error;

@@ -4,7 +4,8 @@
   shares       Q.q = sum of Q.c.q over the constraints c, to rounding of the summands
   residual     |f| (or |G v - nu|) of what acts is at rounding: at most ROUNDING of its own size,
                the sum over q of |G_q| max(|q| so far, its start, parameters of its unit), with
-               G_q = Q.c.q / lambda.c as the FMU itself reports it; of velocities: the largest of the unit
+               G_q = Q.c.q / lambda.c as the FMU itself reports it, or df/dq of the model's f; of
+               velocities: the largest of the unit
   push         lambda >= 0 while a contact is closed, within 10 tol of the largest |lambda|
   no pull      lambda = 0, exactly, while it is open: f lambda = 0
   outside      f >= 0 while it is open, within the gap of 1e-9 of f's own size in which it touches
@@ -23,13 +24,14 @@ from numpy.typing import NDArray
 
 from ... import names
 from ...verification.closed_forms import landed
+from ...verification.evaluate import Compiled
 from .closed_forms import JudgedForm
 from .facts import Facts
 from .player import Run
 
 EPS = float(np.finfo(float).eps)
 ROUNDING = 200 * EPS  # of a residual, relative to its own size
-TIED = 4.0  # of a joint's row, as sizes: in the attitudes of two bodies it is of second degree
+TIED = 14 * 3**0.5  # of the largest length: what the size of a joint's row is at most (_size)
 NOTHING = EPS**2 / ROUNDING  # of the usual place: the square of its rounding is nothing
 GAP = 4e-9  # of f's own size: nearer than a quarter of that a contact touches
 Column = NDArray[np.float64]
@@ -61,7 +63,7 @@ def invariants(facts: Facts, run: Run, forms: Sequence[JudgedForm], elapsed: Col
     if bad:
         return checks
     checks += _shares(facts, run)
-    sizes = {c: _size(facts, run, c) for c in facts.constraints}
+    sizes = sizes_of(facts, run, forms)
     checks += _residuals(facts, run, sizes)
     checks += _contacts(facts, run, sizes)
     checks = [replace(c, instant=True) for c in checks]
@@ -164,48 +166,75 @@ def _shares(facts: Facts, run: Run) -> list[Check]:
     return checks
 
 
-def _size(facts: Facts, run: Run, constraint: str) -> Column | None:
-    """The size of f, or of G v - nu, up to each row; None where lambda never shows G."""
+def sizes_of(facts: Facts, run: Run, forms: Sequence[JudgedForm]) -> dict[str, Column | None]:
+    """Of each constraint the size of f, or of G v - nu, up to each row; None where nothing shows it."""
+    laws = {form.closed_form.name: form.expected for form in forms}
+    reach = {n: _reach(facts, run, n) for n in _moving(facts)}
+    return {
+        c: _size(facts, run, c, laws.get(names.name(names.RESIDUAL, c)), reach)
+        for c in facts.constraints
+    }
+
+
+def _size(
+    facts: Facts,
+    run: Run,
+    constraint: str,
+    law: Compiled | None,
+    reach: Mapping[str, Column],
+) -> Column | None:
+    """G is shown by lambda and its shares, of names of one word; of a joint's row by the model's `law`.
+
+    Without that it is known to be e . (p2 - p1) with p = r + R s, or a2 . b1 of unit vectors.  A unit
+    quaternion moves R s by 2 |s| for each of its components, the sum of which is at most 2: with no place or
+    length above L that is sqrt(3) L for each r, 4 sqrt(3) L for each s, and 4 sqrt(3) L for e, whose lever is
+    p2 - p1; in the plane |s| for each radian that the angle has.
+    """
     rows, lam = run.rows, run.rows[names.name(names.MULTIPLIER, constraint)]
-    acting = np.abs(lam) > np.finfo(float).tiny / EPS
-    if not acting.any():
-        return None
-    size = np.zeros(len(rows))
     shares = {q: facts.share(constraint, q) for q in facts.coordinates}
-    if not any(shares.values()):
-        # which name constraints of one word only: at least what has f's unit
+    size = np.zeros(len(rows))
+    if any(shares.values()):
+        acting = np.abs(lam) > np.finfo(float).tiny / EPS
+        if not acting.any():
+            return None
+        for q, share in shares.items():
+            if share is not None:
+                G = np.abs(rows[share] / np.where(acting, lam, 1.0))
+                moved = reach[names.derivative(q) if facts.rates(constraint) else q]
+                size += np.where(acting, G, G[acting].max()) * moved
+    elif law is not None:
+        size = law.shaken(rows, rows, run.values, reach)
+    else:
         residual = names.name(names.RESIDUAL, constraint)
         least = max(facts.same_unit(residual, run.values), NOTHING * facts.usual(residual))
         if not any(facts.dimensions[residual][:-1]):
             least = max(least, 1.0)  # of axes of length 1, and of angles
-        size = TIED * np.maximum(_largest_peer(facts, run, residual), least)
-    for q, share in shares.items():
-        if share is None:
-            continue
-        column, name = rows[q], q
-        if facts.rates(constraint):
-            name = names.derivative(q)
-            column = rows[name]
-        least = max(facts.same_unit(name, run.values), abs(run.values.get(name, 0.0)))
-        peers = _largest_peer(facts, run, name)
-        if facts.rates(constraint):  # they are found together, beside the fastest of them
-            column = peers
-        else:
-            least = max(least, NOTHING * max(facts.usual(q), float(peers[-1])))
-            if not any(facts.dimensions[q][:-1]):
-                least = max(least, 1.0)  # sines and cosines of angles stand beside 1
-        G = np.abs(rows[share] / np.where(acting, lam, 1.0))
-        size += np.where(acting, G, G[acting].max()) * np.maximum(
-            np.maximum.accumulate(np.abs(column)), least
-        )
+        size = TIED * np.maximum(_largest_peer(facts, run, residual), least) * wound(facts, run)
     return np.where(size > 0, size, 1.0)
+
+
+def _reach(facts: Facts, run: Run, name: str) -> Column:
+    """How large a coordinate has been so far, at least its start and the parameters of its unit; velocities
+    are found together: as large as the fastest of them."""
+    peers = _largest_peer(facts, run, name)
+    least = max(facts.same_unit(name, run.values), abs(run.values.get(name, 0.0)))
+    if name not in facts.coordinates:
+        return np.maximum(peers, least)
+    least = max(least, NOTHING * max(facts.usual(name), float(peers[-1])))
+    if not any(facts.dimensions[name][:-1]):
+        least = max(least, 1.0)  # sines and cosines of angles stand beside 1
+    return np.maximum(np.maximum.accumulate(np.abs(run.rows[name])), least)
+
+
+def _moving(facts: Facts) -> set[str]:
+    """Coordinates, velocities and speeds."""
+    speeds = [v.name for v in facts.outputs if names.derivative(v.name) in facts.variables]
+    return {*names.motion(facts.coordinates), *speeds} & facts.dimensions.keys()
 
 
 def _largest_peer(facts: Facts, run: Run, name: str) -> Column:
     """The largest magnitude so far among the coordinates, velocities or speeds of the same unit."""
-    speeds = [v.name for v in facts.outputs if names.derivative(v.name) in facts.variables]
-    moving = {*names.motion(facts.coordinates), *speeds} & facts.dimensions.keys()
-    same = [n for n in moving if facts.dimensions[n] == facts.dimensions[name]]
+    same = [n for n in _moving(facts) if facts.dimensions[n] == facts.dimensions[name]]
     largest = np.maximum.reduce([np.zeros(len(run.rows)), *(np.abs(run.rows[n]) for n in same)])
     return np.asarray(np.maximum.accumulate(largest))
 
