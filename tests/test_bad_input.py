@@ -483,6 +483,7 @@ def test_mass_that_vanishes_at_the_start_is_no_negative_one():
         ({"tolerance": "1e-6"}, ("tolerance = '1e-6'", "positive number")),
         ({"stop_time": "4"}, ("stop_time = '4'", "positive number")),
         ({"step": "0.1"}, ("step = '0.1'", "positive number")),
+        ({"name": "N" * 300}, ("'NNNN", "has 300 letters, expected at most 200")),  # a file's name
         ({"name": "my scene"}, ("'my scene'", "not a name that FMI allows")),
     ],
 )
@@ -685,7 +686,9 @@ def test_a_folder_that_cannot_be_written_is_refused(tmp_path):
     assert (tmp_path / "file").read_text() == "keep me"
     (tmp_path / "Pendulum.fmu").mkdir()
     says(
-        refusal(lambda: build_fmu(pendulum(), tmp_path, check=False), BuildError), "Is a directory"
+        refusal(lambda: build_fmu(pendulum(), tmp_path, check=False), BuildError),
+        "Is a directory",
+        "a folder of that name is there",
     )
     assert sorted(p.name for p in tmp_path.iterdir()) == ["Pendulum.fmu", "file"]
 

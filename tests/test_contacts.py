@@ -206,3 +206,12 @@ def test_walls_that_meet_are_named(built):
             one.step(1.5)
         cause = next(text for status, _, text in one.log if status == 2)
         assert "contact 'left', contact 'right' change without end: do surfaces meet" in cause
+    with instance(
+        built(model)
+    ) as one:  # told before as "about inf internal steps: take a shorter one"
+        one.start({"w": 1e-9})
+        with pytest.raises(FMICallException):
+            one.step(1.5)
+        cause = next(text for status, _, text in one.log if status == 2)
+        assert "more than 1e+07 internal steps" in cause
+        assert "contact 'left', contact 'right' change without end" in cause

@@ -254,6 +254,7 @@ def test_axes_are_crossed_in_the_order_in_which_they_are_given():
         (["--vary", "theta=0:1:10:log"], "both ends above zero"),
         (["--vary", "theta=1:2"], "FROM:TO:COUNT"),
         (["--vary", "theta=one"], "'one' is no finite number"),
+        (["--vary", "solver.method=foo"], "method 'foo' is unknown, expected one of auto, dop853"),
         (["--vary", "theta=1:x:5"], "--vary 'theta=1:x:5'"),  # :x: is no picture of a cross
         (["--vary", "theta=0:1:1000000000"], "8 GB"),
         (["--vary", "theta=0:1:100000", "--vary", "m=1:2:100000"], "1e+10 runs"),

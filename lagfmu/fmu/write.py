@@ -232,9 +232,7 @@ def write_whole(path: Path, content: bytes) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     except OSError as error:
-        raise BuildError(
-            f"cannot write {str(path)!r} ({error.strerror or error}): choose another output folder"
-        ) from None
+        raise _unwritable(path, error) from None
     try:
         with os.fdopen(handle, "wb") as file:
             file.write(content)
@@ -242,6 +240,9 @@ def write_whole(path: Path, content: bytes) -> None:
         os.replace(name, path)
     except OSError as error:
         Path(name).unlink(missing_ok=True)
-        raise BuildError(
-            f"cannot write {str(path)!r} ({error.strerror or error}): choose another output folder"
-        ) from None
+        raise _unwritable(path, error) from None
+
+
+def _unwritable(path: Path, error: OSError) -> BuildError:
+    remedy = "a folder of that name is there" if path.is_dir() else "choose another output folder"
+    return BuildError(f"cannot write {str(path)!r} ({error.strerror or error}): {remedy}")

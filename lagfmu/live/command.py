@@ -35,9 +35,12 @@ class Played:
         )
 
     def write(self, path: str | os.PathLike[str]) -> Path:
-        """The page as an HTML file, to be opened by a browser."""
-        write_whole(Path(path), self.text.encode())
-        return Path(path)
+        """The page as an HTML file, to be opened by a browser; in a folder it is called NAME.html."""
+        file = Path(path)
+        if file.is_dir():
+            file /= f"{self.name}.html"
+        write_whole(file, self.text.encode())
+        return file
 
 
 def play(
@@ -57,7 +60,7 @@ def write_page(
 ) -> Path:
     """Write the page of a model or a model file (in `scene`, default: its first) or of a native FMU.
 
-    `out` is the HTML file, by default dist/page/NAME.html.  Raises ModelError, DerivationError,
+    `out` is the HTML file, or a folder for it, by default dist/page/NAME.html.  Raises ModelError, DerivationError,
     VerificationError for a file that is no FMU, and BuildError where nothing can be compiled.
     """
     page = play(target, scene)

@@ -17,6 +17,7 @@ from .elements import NAME, is_number
 
 FORMULATIONS = ("multipliers", "nullspace", "minimal")
 EVERYTHING = ("*",)
+LONGEST = 200  # letters of a name: a file's may have 255, with what stands before and after
 EXPLICIT = ("dop853", "rk4")  # methods whose steps are differentiated, and with them ...
 VARIED = (*EXPLICIT, "radau5")  # ... what has to be asked for
 
@@ -82,6 +83,11 @@ class Scene:
         if not NAME.match(self.name):
             problems.append(
                 f"scene name {self.name!r} is not a name that FMI allows: use letters, digits and _"
+            )
+        elif len(self.name) > LONGEST:
+            problems.append(
+                f"scene name {self.name[:20] + '...'!r} has {len(self.name)} letters, expected at most "
+                f"{LONGEST}: files are called by it"
             )
         elif keyword.iskeyword(self.name):
             problems.append(

@@ -76,6 +76,7 @@ def read_statements(path: Path, description: Any) -> list[Against]:
     common = said.pop("within", WITHIN)
     if not _is_number(common) or common < 0:
         problems.append(f"within = {common!r}, expected a number from 0")
+        common = WITHIN  # told once, not with each table
     found: list[Against] = []
     for kind, entries in said.items():
         if kind not in KINDS:

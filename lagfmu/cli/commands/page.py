@@ -20,7 +20,8 @@ def page(
         Path, typer.Argument(metavar="MODEL.py|FILE.fmu", help="A model file, or a native FMU.")
     ],
     out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="The file; default dist/page/NAME.html.")
+        Path | None,
+        typer.Option("--out", "-o", help="The file, or its folder; default dist/page/NAME.html."),
     ] = None,
     scene: SceneName = None,
     arguments: Arguments = None,

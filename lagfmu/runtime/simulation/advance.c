@@ -20,6 +20,7 @@ static const double AT_ONCE = 1e-9; /* ... natural times that are next to none *
 static const double PATIENCE = 200; /* steps after which a doStep is judged by its average step, ... */
 static const double STEP_LIMIT = 1e7; /* ... and the steps that it may need in all */
 static const double HEADWAY = 1e-6; /* natural times below which a step makes none */
+static const char JUMPS[] = ": is there a force that jumps to and fro?";
 static const double AHEAD = 2;        /* natural times of the motion that a step may reach ahead, */
 static const double FAR_AHEAD = 1e6;  /* and communication steps: dense output keeps ten digits */
 
@@ -293,8 +294,8 @@ Status solver_meet(Solver *s) {
     return s->peaks > 0 ? OPTIONAL.peaks->here(s, 0) : OK;
 }
 
-/* Which contacts and frictions have changed again and again since a time [s]: their names are told. */
-static Status tell_of_chatter(Solver *s, double since) {
+/* Appends the names of the contacts and frictions that have changed since a time [s]; 0 if there are none. */
+static int name_changes(Solver *s, double since) {
     const System *system = s->system;
     const char *begin = ": ";
     for (int i = 0; i < system->contacts + system->frictions; i++) {
@@ -308,8 +309,14 @@ static Status tell_of_chatter(Solver *s, double since) {
                    friction < 0 ? system->rows[system->contact[i]].name : system->friction[friction].name);
         begin = ", ";
     }
-    why_append(&s->why, begin[0] == ':' ? ": is there a force that jumps to and fro?"
-                                        : " change without end: do surfaces meet, or does a force jump to and fro?");
+    return begin[0] == ',';
+}
+
+/* Which contacts and frictions have changed again and again since a time [s], or what else it may be. */
+static Status tell_of_chatter(Solver *s, double since, const char *otherwise) {
+    why_append(&s->why, "%s",
+               name_changes(s, since) ? " change without end: do surfaces meet, or does a force jump to and fro?"
+                                      : otherwise);
     return FAILED;
 }
 
@@ -327,13 +334,15 @@ static Status check_headway(Solver *s, double t_end, double begun, Count first) 
                    "%.0f internal steps (solver.maximum_steps) were shorter than %.2g s, %.0e of the "
                    "motion's natural time",
                    t_end, t, most, HEADWAY / pace, HEADWAY);
-        return tell_of_chatter(s, t - most * HEADWAY / pace);
+        return tell_of_chatter(s, t - most * HEADWAY / pace, JUMPS);
     }
-    if (done >= PATIENCE && done * (t_end - begun) > STEP_LIMIT * gone)
-        return fail(&s->why,
-                    "the communication step to t = %.17g s would need about %.0e internal "
-                    "steps, more than %.0e: take a shorter one",
-                    t_end, done * (t_end - begun) / gone, STEP_LIMIT);
+    if (done >= PATIENCE && done * (t_end - begun) > STEP_LIMIT * gone) {
+        (void)fail(&s->why,
+                   "the communication step to t = %.17g s would need more than %.0e internal steps, "
+                   "%.0f took it from t = %.17g s to %.17g s",
+                   t_end, STEP_LIMIT, done, begun, t);
+        return tell_of_chatter(s, begun, ": take a shorter one");
+    }
     return OK;
 }
 
@@ -393,7 +402,7 @@ static Status check_crowd(Solver *s) {
     s->crowd += 1;
     if (s->crowd < CHATTER) return OK;
     (void)fail(&s->why, "%d events in %.1g s at t = %.17g s", CHATTER, now->t - s->crowd_since, now->t);
-    return tell_of_chatter(s, s->crowd_since);
+    return tell_of_chatter(s, s->crowd_since, JUMPS);
 }
 
 static Status complete_nominals(Solver *s, double span) {

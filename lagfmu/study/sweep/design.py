@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from ...errors import SettingError
-from ...methods import NUMBERS
+from ...methods import NUMBERS, unknown
 from ...names import METHOD
 
 Values = NDArray[np.float64]
@@ -61,7 +61,9 @@ class Design:
 def number(text: str, name: str, what: str) -> float:
     """A finite number; for `solver.method` also a method's name."""
     text = text.strip()
-    if name == METHOD and text in NUMBERS:
+    if name == METHOD:
+        if text not in NUMBERS:
+            raise SettingError(f"{what}: {unknown(text)}")
         return float(NUMBERS[text])
     try:
         value = float(text)
