@@ -71,12 +71,13 @@ def test_a_python_fmu_has_no_sources_to_compile(
 
 def test_a_page_shows_what_is_asked_for(native_fmu: Callable[[str], Path], tmp_path: Path) -> None:
     """--add-output and --outputs as in build: the pull of the rod m (g cos(theta) + L omega^2) beside lambda,
-    of which it is -2 L lambda; of an FMU they are refused."""
+    of which it is -2 L lambda; of an FMU they are refused.  A folder gets a file of the model's name."""
     model = str(MODELS / "pendulum.py")
-    out = tmp_path / "pull.html"
     words = ["--add-output", "pull = -2*L*lambda.rod [N]", "--outputs", "pull,lambda.rod"]
-    result = CliRunner().invoke(app, ["page", model, *words, "--out", str(out)])
+    result = CliRunner().invoke(app, ["page", model, *words, "--out", str(tmp_path)])
     assert result.exit_code == 0, result.output
+    [out] = tmp_path.iterdir()
+    assert out.suffix == ".html"
     facts = json.loads(re.search(r'id="facts"[^>]*>(.*?)</script>', out.read_text(), re.DOTALL)[1])
     names = {name for name, *_ in facts["variables"]}
     assert {"pull", "lambda.rod"} <= names

@@ -40,6 +40,10 @@ def print_verdicts(found: Verification) -> None:
     print_whole(console, table)
     if len(found.checks) <= OF_THE_FILE:
         console.print("[yellow]the FMU carries no closed forms: its physics was not checked[/]")
+    if found.left_out:
+        of = f"{found.left_out} of {found.left_out + found.closed_forms} closed forms"
+        told = f"{of} were not checked: this FMU leaves out what they need"
+        say(told, "note:", "yellow")
     for check in found.checks:
         if check.failed and check.detail:
             say(check.detail, f"{escape(check.name)}:", "red", errors)

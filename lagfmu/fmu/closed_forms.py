@@ -134,13 +134,12 @@ def pack_closed_forms(
 
     `numbers` are the values of parameters that the FMU does not have, `held` the contacts that stay
     closed, `contacts` those that may open, `tables` those that the model looks up, besides those of the
-    closed forms.  Those that need a variable which the scene leaves out are left out too.  Raises ModelError
-    if one uses what no FMU of the model has.
+    closed forms.  Those that need a variable which the scene leaves out are left out too, and counted.  Raises
+    ModelError if one uses what no FMU of the model has.
     """
+    known_of = carried(scene, closed_forms)
     applying = [
-        found
-        for form in carried(scene, closed_forms)
-        if (found := form.in_scene(numbers or {}, held)) is not None
+        found for form in known_of if (found := form.in_scene(numbers or {}, held)) is not None
     ]
     known = {v.name for v in table.variables}
     if names.DISSIPATED in known:
@@ -183,6 +182,8 @@ def pack_closed_forms(
     if problems:
         raise ModelError(scene.name, problems)
     record: dict[str, Any] = {"format": FORMAT, "closed_forms": packed}
+    if len(kept) < len(known_of):
+        record["left_out"] = len(known_of) - len(kept)
     if tables:
         record["tables"] = [
             {"name": s.name, "x": s.x, "y": s.y, "ends": s.ends}
@@ -190,6 +191,11 @@ def pack_closed_forms(
             for s in tables
         ]
     return json.dumps(record, indent=1).encode()
+
+
+def left_out_of(content: bytes) -> int:
+    """How many closed forms the scene leaves out, of a file that unpack_closed_forms() reads."""
+    return int(json.loads(content).get("left_out", 0))
 
 
 def unpack_closed_forms(content: bytes, name: str) -> list[CarriedForm]:
@@ -206,6 +212,8 @@ def unpack_closed_forms(content: bytes, name: str) -> list[CarriedForm]:
         for what, field in (("closed forms", "closed_forms"), ("tables", "tables")):
             if not isinstance(data.get(field, []), list) or "closed_forms" not in data:
                 raise ValueError(f"expected a list of {what}")
+        if type(data.get("left_out", 0)) is not int:
+            raise ValueError("expected a number of closed forms that are left out")
         functions = functions_of([_spline(entry) for entry in data.get("tables", [])])
         return [_form(entry, functions) for entry in data["closed_forms"]]
     except (ValueError, RecursionError) as error:

@@ -35,7 +35,7 @@ class Played:
         )
 
     def write(self, path: str | os.PathLike[str]) -> Path:
-        """The page as an HTML file, to be opened by a browser; in a folder it is called NAME.html."""
+        """The page as an HTML file for a browser; in a folder it is called NAME.html."""
         file = Path(path)
         if file.is_dir():
             file /= f"{self.name}.html"

@@ -21,6 +21,7 @@ def report(file: str, found: Verification) -> Report:
             for c in found.checks
         ],
         "uncovered_outputs": found.uncovered,
+        "closed_forms_left_out": found.left_out,
     }
     uncovered = {"uncovered outputs": ", ".join(found.uncovered)}
     return Report(file, found, cases, data, properties=uncovered)

@@ -15,7 +15,7 @@ from fmpy.validation import validate_fmu
 from .. import names
 from ..errors import SettingError, VerificationError
 from ..fmu.archive import opened
-from ..fmu.closed_forms import LARGEST_RECORD, CarriedForm, unpack_closed_forms
+from ..fmu.closed_forms import LARGEST_RECORD, CarriedForm, left_out_of, unpack_closed_forms
 from ..fmu.read import Trajectory, experiment_of, kind_of, numbers_of, read_description
 from ..fmu.write import as_fmu
 from ..model.closed_form import ClosedForm, Conserved
@@ -69,7 +69,8 @@ def verify(
         against: list[Against] = [] if reference is None else [reference]
         if statements is not None:
             against += read_statements(Path(statements), description)
-        forms = closed_forms_in(path) if not against or is_ours(path) else []
+        ours = not against or is_ours(path)
+        forms, left_out = (closed_forms_in(path), left_out_in(path)) if ours else ([], 0)
         _check_texts(description, start_values or {})
         problems = validate_fmu(str(path))
         begun = time.perf_counter()
@@ -115,6 +116,7 @@ def verify(
         steps,
         len(forms),
         tuple(n for n in outputs if n not in said),
+        left_out,
     )
 
 
@@ -157,6 +159,12 @@ def closed_forms_in(path: Path) -> list[CarriedForm]:
     if problems:
         raise VerificationError(f"{str(path)!r}: " + "; ".join(problems))
     return closed_forms
+
+
+def left_out_in(path: Path) -> int:
+    """How many closed forms of its model an FMU of lagfmu leaves out."""
+    with opened(path) as archive:
+        return left_out_of(_record(archive))
 
 
 def _record(archive: zipfile.ZipFile) -> bytes:

@@ -14,7 +14,7 @@ from ...fmu.face import Face
 from ...fmu.target import NATIVE, PYTHON
 from ...verification.exit_codes import FAILS
 from .. import options
-from ..terminal import console, kilobytes, plainly, say, say_wrote
+from ..terminal import console, kilobytes, plainly, say_wrote
 
 if TYPE_CHECKING:
     from ...interface.variables import VariableTable
@@ -91,7 +91,6 @@ def build(
 ) -> None:
     """Build the FMUs of a model file into OUT/native/NAME.fmu or OUT/python/NAME.fmu, and verify them."""
     from ...api import package
-    from ...fmu.closed_forms import carried
     from ...prepare.prepare import prepare
     from ..finish import print_verdicts
     from ..progress import progress
@@ -139,10 +138,6 @@ def build(
             if found is not None:
                 print_verdicts(found)
                 failed |= not found.passed
-                known = len(carried(s, file.closed_forms))
-                if left := known - found.closed_forms:
-                    lacks = "not checked: this FMU leaves out what they need"
-                    say(f"{left} of {known} closed forms were {lacks}", "note:", "yellow")
     if failed:
         raise typer.Exit(FAILS)
 
