@@ -134,8 +134,8 @@ def pack_closed_forms(
 
     `numbers` are the values of parameters that the FMU does not have, `held` the contacts that stay
     closed, `contacts` those that may open, `tables` those that the model looks up, besides those of the
-    closed forms.  Those that need a variable which the scene leaves out are left out too, and counted.  Raises
-    ModelError if one uses what no FMU of the model has.
+    closed forms.  Those that need a variable which the scene leaves out are left out too, and counted.
+    Raises ModelError if one uses what no FMU of the model has.
     """
     known_of = carried(scene, closed_forms)
     applying = [

@@ -64,8 +64,8 @@ class Check:
 class Verification:
     """The checks of one FMU, `closed_forms` of them closed forms, and what the run cost.
 
-    `uncovered` are the outputs of which no closed form and no reference says anything; `left_out` closed forms
-    of the model need what this FMU does not have.
+    `uncovered` are the outputs of which no closed form and no reference says anything;
+    `left_out` closed forms of the model need what this FMU does not have.
     """
 
     name: str
