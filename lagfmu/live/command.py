@@ -60,8 +60,10 @@ def write_page(
 ) -> Path:
     """Write the page of a model or a model file (in `scene`, default: its first) or of a native FMU.
 
-    `out` is the HTML file, or a folder for it, by default dist/page/NAME.html.  Raises ModelError,
-    DerivationError, VerificationError for a file that is no FMU, and BuildError where nothing can be compiled.
+    `out` is the HTML file, or a folder for it, by default dist/page/NAME.html.
+
+    Raises ModelError, DerivationError, VerificationError for a file that is no FMU, and BuildError where
+    nothing can be compiled.
     """
     page = play(target, scene)
     return page.write(out or FOLDER / f"{page.name}.html")
