@@ -300,6 +300,10 @@ def test_a_bead_on_a_rough_helix_rubs_with_the_norm_of_what_is_across_it():
     np.testing.assert_allclose(run["der(K.curve.s)"] * way, v, rtol=1e-9)
     normal, rubs = m * across(v), m * mu * across(v)
     np.testing.assert_allclose(run["force.K.norm"][1:], np.hypot(normal, rubs)[1:], rtol=1e-9)
+    angle = run["K.curve.s"]
+    tangent = -R * np.sin(angle) / way, R * np.cos(angle) / way, -h / way
+    along = sum(run[f"force.K.{x}"] * t for x, t in zip("xyz", tangent, strict=True))
+    np.testing.assert_allclose(along[1:], -rubs[1:], rtol=1e-9)
 
 
 def test_a_ball_on_a_turntable_goes_round_with_two_sevenths_of_its_rate():
