@@ -80,6 +80,23 @@ def test_a_marker_lays_z_along_the_axis_of_the_file() -> None:
         np.testing.assert_allclose(np.array(marker.rotation)[:, 2], [0, 0.6, 0.8], atol=1e-15)
 
 
+def test_a_joint_behind_a_link_without_mass_stands_where_both_origins_put_it(
+    tmp_path: Path,
+) -> None:
+    """A mast, 1 m up and turned by a right angle, carries a hinge 2 m along it, which turns about -z."""
+    mast = '<origin xyz="0 0 1" rpy="0 0 1.5707963267948966"/>'
+    arm = joint("j", "mast", "arm").replace("0 0 1", "0 0 -1")
+    parts = (
+        joint("m", "base", "mast", "fixed", mast),
+        arm.replace("<axis", '<origin xyz="2 0 0"/><axis'),
+    )
+    hinge = from_urdf(robot(tmp_path, BASE, link("mast", ""), link("arm"), *parts)).joints[0]
+    np.testing.assert_allclose(hinge.first.point, (0, 2, 1), atol=1e-15)
+    turned = np.array(hinge.first.rotation)
+    np.testing.assert_allclose(turned[:, 2], (0, 0, -1), atol=1e-15)
+    np.testing.assert_allclose(np.cross(turned[:, 0], turned[:, 1]), turned[:, 2], atol=1e-15)
+
+
 BASE = link("base", "")
 WRONG: dict[str, tuple[tuple[str, ...], str]] = {
     "mimic": (

@@ -83,10 +83,11 @@ def stages(priority: Sequence[int]) -> Iterator[Stage]:
             yield Stage(highest, of, free, np.where(free, PRIORITY_EASE**below, 1.0))
 
 
-def gently(priority: Sequence[int]) -> Stage:
-    """The last stage, in which all may move."""
+def gently(priority: Sequence[int]) -> Iterator[Stage]:
+    """The last stage, in which all may move: where all are of one priority, that is the one before."""
     of = np.array(priority, dtype=int)
-    return Stage(SET, of, np.full(len(of), True), PRIORITY_GENTLY ** (SET - of))
+    if len({*priority}) > 1:
+        yield Stage(SET, of, np.full(len(of), True), PRIORITY_GENTLY ** (SET - of))
 
 
 def initial_positions(
@@ -110,7 +111,7 @@ def initial_positions(
     priority = [GIVEN] * system.nq if priority is None else priority
     missed = np.zeros(len(fixed))
     moves = _of_speeds(system, priority)
-    for stage in (*stages(moves), gently(moves)):
+    for stage in (*stages(moves), *gently(moves)):
         q, missed = _newton(at, q0, v0, fixed, size, stage)
         if not missed.any():
             return q
