@@ -17,7 +17,7 @@ from .codegen.c.equations import model_source
 from .codegen.c.printer import HELPERS, identifiers, number, string
 from .codegen.c.solve import solve_source
 from .codegen.py.equations import lower
-from .fmu import compiler, described
+from .fmu import archive, compiler, described
 from .fmu import target as targets
 from .fmu.archive import version as archive_version
 from .fmu.batch import LAST, MAX, MEAN, TIME_OF_MAX, Plan, in_session, run_batch

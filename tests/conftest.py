@@ -41,6 +41,7 @@ from lagfmu.testing import (
     ModelFile,
     Playable,
     Prepared,
+    archive,
     find_compiler,
     load,
     prepare,
@@ -51,6 +52,10 @@ from lagfmu.testing import playable as playable_of
 
 gc.set_threshold(100_000, 20, 20)  # as the command has it
 typer.testing._get_command = cache(typer.testing._get_command)  # put together once a process
+SMALL, archive.LEVEL = (
+    archive.LEVEL,
+    1,
+)  # a fifth of the work: as users have them are those of models/
 
 MODELS = Path(__file__).parent.parent / "models"
 FILES = {
@@ -114,6 +119,14 @@ def of_each_kind(
     ]
 
 
+@contextmanager
+def as_small_as_can_be() -> Iterator[None]:
+    """FMUs are packed as users have them."""
+    with pytest.MonkeyPatch.context() as packing:
+        packing.setattr(archive, "LEVEL", SMALL)
+        yield
+
+
 @cache
 def model_file(name: str) -> ModelFile:
     """A file of models/, or of benchmarks/, loaded once."""
@@ -155,7 +168,8 @@ def _built(prepared: Callable[[str], Prepared], folder: Path, target: str, fmi: 
         forms = model_file(EVERY[name]).closed_forms
 
         def make(place: Path) -> None:
-            write(prepared(name), place, forms, target=target, face=face)
+            with as_small_as_can_be():
+                write(prepared(name), place, forms, target=target, face=face)
 
         return once(folder / f"{face.folder(target)}-{name}", make) / f"{name}.fmu"
 

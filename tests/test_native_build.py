@@ -17,7 +17,7 @@ import binaries
 import numpy as np
 import pytest
 import runs
-from conftest import BOTH, EVERY, MODELS, of_each_kind
+from conftest import BOTH, EVERY, MODELS, as_small_as_can_be, of_each_kind
 from fmi2 import FUNCTIONS
 from fmpy import extract, read_model_description, simulate_fmu
 from fmpy.build import build_platform_binary
@@ -68,7 +68,8 @@ def built_for(prepared, shared_folder) -> Callable[..., Path]:
 
     def get(*platforms: str) -> Path:
         def make(place: Path) -> None:
-            write(prepared("Hemisphere"), place, target="native", platforms=platforms)
+            with as_small_as_can_be():
+                write(prepared("Hemisphere"), place, target="native", platforms=platforms)
 
         return once(shared_folder / f"for-{'-'.join(platforms)}", make) / "Hemisphere.fmu"
 
@@ -522,10 +523,13 @@ def test_rattle_is_refused_at_the_build_where_it_cannot_step(prepared, tmp_path)
 
 
 def test_an_object_of_the_cache_that_is_not_whole_is_made_anew(tmp_path, monkeypatch):
-    """Half of it, nothing, or a bit that is another: the library has the same bytes as before, and so has
-    the object then."""
+    """Half of it, nothing, or a bit that is another: the library has the same bytes as before, though others
+    of its objects are whole, and so has the object then."""
     monkeypatch.setenv("LAGFMU_CACHE", str(tmp_path))
-    runtime = {"one.c": b"int one(void) { return 1; }\n"}
+    seen = b'__attribute__((visibility("default"))) '
+    runtime = {
+        f"{n}.c": seen + b"int %b(void) { return 1; }\n" % n.encode() for n in ("one", "two")
+    }
 
     def library() -> bytes:
         (made,) = compile_libraries("One", {}, runtime, (host(),)).values()

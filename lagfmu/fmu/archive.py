@@ -21,6 +21,7 @@ from ..errors import TemporaryFolderError, VerificationError
 LARGEST = 1 << 31  # bytes of all files of an FMU, unpacked
 MOST = 100_000  # files
 SHOWN = 3  # problems in a message
+LEVEL = 9  # of zlib: as small as can be
 DAMAGED = (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, struct.error)
 OUTSIDE = re.compile(r"[/\\]|.*[:\\]|(.*/)?\.\.(/|\Z)", re.S)  # absolute, of a drive, or above
 
@@ -46,7 +47,7 @@ def pack(contents: Mapping[str, bytes]) -> bytes:
             info.external_attr = 0o644 << 16
             info.compress_type = zipfile.ZIP_DEFLATED
             # that of `archive` is not taken
-            archive.writestr(info, contents[name], compresslevel=9)
+            archive.writestr(info, contents[name], compresslevel=LEVEL)
     return buffer.getvalue()
 
 

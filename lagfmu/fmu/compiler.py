@@ -244,7 +244,7 @@ def _objects(compiler: Compiler, target: str, runtime: Mapping[str, bytes]) -> d
             Path(folder, made).write_bytes(hashlib.sha256(content).digest() + content)
             with contextlib.suppress(OSError):  # another process was faster
                 Path(folder, made).replace(places[file])
-    return objects
+    return {file: objects[file] for file in places}  # in one order: that of the bytes of a library
 
 
 def _cached(place: Path) -> bytes | None:
