@@ -10,6 +10,7 @@ from sympy import S, cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Holonomic, Model, Parameter
+from lagfmu.bodies import Body, Ground, Revolute, mechanism
 
 TIME = dynamicsymbols._t
 
@@ -59,6 +60,19 @@ def rods(name: str, joints: Sequence[tuple[float, float]]) -> Model:
 
 
 FOUR_BAR = ((0.5, 0.75**0.5), (1.9, 1.6), (2.2, 0.0))
+
+
+def hinged(n: int, axes: str) -> Model:
+    """n links of 1 m in space that hang straight down, hinged one on the other about these axes by turns: J0,
+    J1, ..., b0, b1, ..."""
+    above = Ground().at((0, 0, 0))
+    links = [Body(f"b{k}", 1.0, (0.02, 0.03, 0.01)) for k in range(n)]
+    joints, start = [], {}
+    for k, link in enumerate(links):
+        joints.append(Revolute(f"J{k}", above, link.at((0, 0, 0.5)), axis=axes[k % len(axes)]))
+        above = link.at((0, 0, -0.5))
+        start[f"{link.name}.position"] = (0, 0, -0.5 - k)
+    return mechanism(f"Hinged{n}", bodies=links, joints=joints, start=start)
 
 
 def pinned_rod(start: Mapping[Any, float]) -> Model:

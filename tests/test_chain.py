@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+import re
 import runpy
 from dataclasses import replace
 
+import fmpy
 import numpy as np
 import pytest
 import sympy as sp
 from conftest import MODELS
+from fmpy import calloc
+from instance import instance
+from linkages import hinged
 from runs import evenly
 from scipy.integrate import solve_ivp
 from scipy.special import roots_laguerre
 
 from lagfmu import derive, simulate
-from lagfmu.testing import Form, System, lower, prepare
+from lagfmu.testing import Form, System, lower, prepare, sources_of
 
 G, MASS, LENGTH = 9.81, 0.1, 0.25
 
@@ -126,6 +131,35 @@ def test_the_closed_form_of_the_multipliers_is_exact(n):
     found = [float(eom.plain(e).subs(table)) for e in multipliers(n)]
     rest = jacobian @ np.linalg.solve(M, F + jacobian.T @ found) - gamma
     assert np.abs(rest).max() < 1e-10 * np.abs(gamma).max()
+
+
+def test_the_angle_of_a_hinge_is_a_matter_of_its_two_bodies():
+    """Its rate holds the upper one's about the axis, and the lower one's three, the ground none: those of all
+    angles are known by as many evaluations in a chain of 12 as in one of 6."""
+    counts = []
+    for n in (6, 12):
+        text = sources_of(prepare(hinged(n, "xy"))).generated["model.c"].decode()
+        names = ("joint_count", "joint_rates", "joint_groups")
+        counts.append([int(re.findall(rf"\.{name} = (\d+)", text)[0]) for name in names])
+    assert [(count, rates) for count, rates, _ in counts] == [(6, 3 + 4 * 5), (12, 3 + 4 * 11)]
+    assert counts[0][2] == counts[1][2] <= 6
+
+
+@pytest.mark.thorough
+def test_an_instance_of_a_long_chain_asks_for_memory_in_proportion(built, monkeypatch):
+    """From where no dense matrix stands by, 64 bodies: 96 have half as much again, to n^1.1."""
+    asked = []
+
+    def counted(count, size):
+        asked.append(count * size)
+        return calloc(count, size)
+
+    monkeypatch.setattr(fmpy, "calloc", counted)
+    for n in (64, 96):
+        with instance(built(hinged(n, "xy"))) as one:
+            one.start()
+    assert len(asked) == 2
+    assert asked[1] <= asked[0] * 1.5**1.1
 
 
 @pytest.mark.thorough

@@ -16,6 +16,7 @@ import pytest
 from fmpy.fmi1 import FMICallException
 from fmpy.validation import validate_fmu
 from instance import instance
+from linkages import hinged
 from runs import evenly, simulate_fmu, sources
 
 from lagfmu import Model, Scene, verify
@@ -246,6 +247,25 @@ def test_what_is_not_asked_for_stays_where_it_can(built: Any) -> None:
         (0.7, 0.2), rel=1e-15
     )
     assert found["angle.A"] == pytest.approx(0.3, rel=1e-13)
+
+
+def test_a_chain_is_set_by_all_its_angles_at_once(built: Any) -> None:
+    """Ends and rates of ten links of 1 m are sums over the angles and rates above."""
+    n, fmu = 10, built(hinged(10, "y"))
+    angles, rates = (
+        [0.3, -0.5, 1.0, 0.1, 0.2, -1.2, 0.4, 0.6, -0.3, 0.7],
+        [k - 2.5 for k in range(n)],
+    )
+    given = {f"angle.J{k}": a for k, a in enumerate(angles)}
+    found = first(fmu, given | {f"der(angle.J{k})": w for k, w in enumerate(rates)})
+    x = z = vx = vz = a = w = 0.0
+    for k in range(n):
+        a, w = a + angles[k], w + rates[k]
+        half = [-sin(a) / 2, -cos(a) / 2, -cos(a) * w / 2, sin(a) * w / 2]
+        at = [x + half[0], z + half[1], vx + half[2], vz + half[3]]
+        names = (form.format(f"b{k}.position.{c}") for form in ("{}", "der({})") for c in "xz")
+        assert [found[name] for name in names] == pytest.approx(at, rel=1e-12, abs=1e-12)
+        x, z, vx, vz = (2 * end - begin for end, begin in zip(at, (x, z, vx, vz), strict=True))
 
 
 def test_an_angle_that_a_motor_prescribes_is_no_start(built: Any, native_fmu: Fmu) -> None:

@@ -1,6 +1,7 @@
-"""Which columns of the derivatives of b and c can be found at once: those of which no two stand in one row.
+"""Which columns of a matrix can be found at once: those of which no two stand in one row.  Of two matrices:
 
-    M dvdot = b + G^T dlambda ,  G dvdot = c      (runtime/mechanics/sensitivity.c)
+    b and c by (t, q, v, u) in  M dvdot = b + G^T dlambda ,  G dvdot = c     (runtime/mechanics/sensitivity.c)
+    rates of joint coordinates by speeds                          (runtime/simulation/joint_coordinates.c)
 
 The columns of a row exclude each other; each column gets the first group in which none is that it
 excludes (Curtis, Powell & Reid, On the estimation of sparse Jacobian matrices, 1974).  Of a chain of
@@ -10,8 +11,10 @@ bodies there are as many groups as three neighbours have coordinates and speeds,
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from itertools import chain, count
+
+import sympy as sp
 
 from ..model.elements import Expr
 from .parts import Parts
@@ -26,19 +29,39 @@ def groups(parts: Parts) -> list[int]:
         return []
     columns = [s for a in ("dt", "dq", "dv", "du") for s in tangent.arguments[a]]
     number = {s: k for k, s in enumerate(columns)}
-    excluded: list[set[int]] = [set() for _ in columns]
-    for row in _rows(parts, {a: [x.expression for x in g] for a, g in tangent.results.items()}):
-        found = _settled(parts, row & number.keys())
-        places = {number[s] for s in found}
-        for k in places:
-            excluded[k] |= places
+    rows = _rows(parts, {a: [x.expression for x in g] for a, g in tangent.results.items()})
+    places = ({number[s] for s in _settled(parts, row & number.keys())} for row in rows)
+    group = _grouped(len(columns), places, LARGEST)
+    return group if 2 * len(set(group)) < len(columns) else []
+
+
+def joint_rates(parts: Parts) -> list[list[tuple[int, int]]]:
+    """The speeds in the rate of each joint coordinate, ascending, each with its group."""
+    eom, number = parts.eom, {s: i for i, s in enumerate(parts.eom.v)}
+    rows = []
+    for c in eom.joint_coordinates:
+        if c.coordinate >= 0:
+            rows.append([i for j, i in parts.rates if j == c.coordinate])
+        else:
+            held = sp.sympify(eom.outputs[c.rate].expression).free_symbols
+            rows.append(sorted(number[s] for s in held & number.keys()))
+    group = _grouped(eom.nv, rows, eom.nv)
+    return [[(i, group[i]) for i in row] for row in rows]
+
+
+def _grouped(size: int, rows: Iterable[Collection[int]], largest: int) -> list[int]:
+    """The group of each column; so many are in one at most."""
+    excluded: list[set[int]] = [set() for _ in range(size)]
+    for row in rows:
+        for k in row:
+            excluded[k].update(row)
     group: list[int] = []
-    size: Counter[int] = Counter()
+    members: Counter[int] = Counter()
     for others in excluded:
         taken = {group[j] for j in others if j < len(group)}
-        group.append(next(g for g in count() if g not in taken and size[g] < LARGEST))
-        size[group[-1]] += 1
-    return group if 2 * len(size) < len(columns) else []
+        group.append(next(g for g in count() if g not in taken and members[g] < largest))
+        members[group[-1]] += 1
+    return group
 
 
 def _rows(parts: Parts, changes: dict[str, Sequence[Expr]]) -> Iterator[set[Expr]]:

@@ -10,7 +10,7 @@ from typing import Any
 from ...mechanics.equations import EquationsOfMotion
 from ...model.model import Nonholonomic
 from ...numeric.system import CONTACT
-from ..columns import groups
+from ..columns import groups, joint_rates
 from ..parts import Parts
 from . import elimination
 from . import solve as csolve
@@ -161,9 +161,19 @@ class Tables:
             self._hold("const int", started=[*self.parts.formulas])
         joints = self.eom.joint_coordinates
         if joints and not self.prefix and self.parts.reduction is None:
-            items = [f'{{"{c.name}", {", ".join(str(int(x)) for x in c[1:])}}}' for c in joints]
-            self.fields["joint_count"] = len(items)
+            items: list[str] = []
+            held: list[tuple[int, int]] = []
+            for c, own in zip(joints, joint_rates(self.parts), strict=True):
+                numbers = (*c[1:], len(held), len(held) + len(own))
+                items.append(f'{{"{c.name}", {", ".join(str(int(x)) for x in numbers)}}}')
+                held += own
+            self.fields |= {
+                "joint_count": len(items),
+                "joint_rates": len(held),
+                "joint_groups": 1 + max((group for _, group in held), default=-1),
+            }
             self._hold("const JointCoordinate", joint=items)
+            self._hold("const JointRate", joint_rate=[f"{{{i}, {group}}}" for i, group in held])
 
     def _lookups(self) -> None:
         """The names and ends of the tables that are looked up."""

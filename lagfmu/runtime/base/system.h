@@ -44,12 +44,18 @@ typedef struct {
 } Friction;
 
 /* What a joint leaves free, where a start may be given: its value and its rate are outputs of the model's own, or
- * `coordinate` is it, with its rate; otherwise that is -1.  within_turn: known modulo 2 pi alone. */
+ * `coordinate` is it, with its rate; otherwise that is -1.  within_turn: known modulo 2 pi alone.  The rate holds the
+ * speeds of joint_rate[begin .. end - 1]. */
 typedef struct {
     const char *name;
     int coordinate, value, rate;
-    int within_turn;
+    int within_turn, begin, end;
 } JointCoordinate;
+
+/* A speed in the rate of a joint coordinate.  No joint coordinate holds two speeds of one group. */
+typedef struct {
+    int speed, group;
+} JointRate;
 
 typedef struct System System;
 
@@ -125,6 +131,8 @@ struct System {
     void (*starts)(const double *p, double *w);
     int joint_count;               /* 0 and NULL without */
     const JointCoordinate *joint;  /* (joint_count) */
+    int joint_rates, joint_groups;
+    const JointRate *joint_rate;   /* (joint_rates) */
     /* The derivative of all of these along the direction (dt, dq, dv, du, dp): what changes in the values
      * when the state moves that way.  dM (masses), dF (nv), dG (entries), dnu, dgamma, df (m),
      * denergy (2).  NULL where nobody asks for derivatives; dp is read where a run's are asked for. */

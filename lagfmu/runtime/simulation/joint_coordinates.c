@@ -1,11 +1,12 @@
 /* joint_coordinates.c -- the step that brings joint coordinates nearer to where they are asked to be, along the
  * constraints and least in the metric of M:
  *
- *   d = d0 + sum_k c_k y_k ,   M d0 = G^T mu ,  G d0 = c ,   M y_k = H_k^T + G^T mu ,  G y_k = 0
+ *   d = d0 + P H^T c ,   H d = miss ,   M d0 = G^T mu ,  G d0 = c0 ,   M P b = b + G^T mu ,  G P b = 0
  *
- * with the y_k made orthogonal one by one (Gram and Schmidt), H_j y_k = 0 for j < k, so that each c_k follows from
- * what is still missing; one that vanishes is determined by the constraints, or by those before.  The rates are linear
- * in v: H is found by one evaluation for each speed. */
+ * c is found by A = H P H^T = L D L^T, row by row (Golub & Van Loan, Matrix Computations, sect. 4.1.2): one solve for
+ * each joint coordinate that is held.  D_k is what is left free of it by the constraints and those before it: where
+ * that vanishes it is determined by them, and c_k = 0.  The rates are linear in v: H, of which each row holds the
+ * speeds of the bodies that the joint ties, is found by one evaluation for each group of speeds that meet in no joint. */
 #include "joint_coordinates.h"
 
 #include <math.h>
@@ -14,6 +15,9 @@
 #include "numbers.h"
 
 static const double DETERMINED = 1e-10; /* sine squared of the angle between H_k and what is left free of it */
+
+/* Row k of A and of L: k + 1 numbers. */
+static double *row_of(const struct JointSearch *x, int k) { return x->A + (size_t)k * (size_t)(k + 1) / 2; }
 
 void joint_layout(Solver *s, Arena *scratch) {
     const System *of = s->system;
@@ -24,10 +28,12 @@ void joint_layout(Solver *s, Arena *scratch) {
     x->priority = arena_take(scratch, (size_t)system_starts(of), sizeof *x->priority);
     x->held = arena_take(scratch, (size_t)nv, sizeof *x->held);
     x->asked = arena_doubles(scratch, system_starts(of));
-    double **const array[] = {&x->q,     &x->trial, &x->v,    &x->d, &x->part, &x->c,   &x->value,
-                              &x->drift, &x->miss,  &x->size, &x->H, &x->Y,    &x->own, &x->other};
-    const int count[] = {nq, nq, nv, nv, nv, of->m, n, n, n, n, n * nv, n * nv, of->output_count, of->output_count};
+    double **const array[] = {&x->q,     &x->trial, &x->v, &x->d, &x->y, &x->part, &x->c,  &x->value,
+                              &x->drift, &x->miss,  &x->size, &x->share, &x->H, &x->own, &x->other};
+    const int count[] = {nq, nq, nv, nv, nv, nv, of->m, n, n, n, n, n, of->joint_rates, of->output_count,
+                         of->output_count};
     for (size_t i = 0; i < sizeof count / sizeof *count; i++) *array[i] = arena_doubles(scratch, count[i]);
+    x->A = arena_take(scratch, (size_t)n * (size_t)(n + 1) / 2, sizeof *x->A);
     x->zero = arena_doubles(scratch, nv + of->m);
 }
 
@@ -39,27 +45,35 @@ static void read_joints(Solver *s, const double *q) {
     of->outputs(x->at.t, q, x->part, x->at.u, x->at.p, x->zero, x->zero + of->nv, x->zero, x->own, x->other);
 }
 
+double joint_along(const Solver *s, int k, const double *v) {
+    const System *of = s->system;
+    const double *H = s->joint_search->H;
+    double sum = 0;
+    for (int e = of->joint[k].begin; e < of->joint[k].end; e++) sum += H[e] * v[of->joint_rate[e].speed];
+    return sum;
+}
+
 void joint_measure(Solver *s, const double *q) {
     struct JointSearch *x = s->joint_search;
     const System *of = s->system;
     Mechanism *b = &s->stepped;
     mechanism_kinematics(b, x->at, q);
     memset(x->part, 0, (size_t)of->nv * sizeof *x->part);
-    memset(x->H, 0, (size_t)(of->joint_count * of->nv) * sizeof *x->H);
     read_joints(s, q);
     for (int k = 0; k < of->joint_count; k++) {
         const JointCoordinate *joint = &of->joint[k];
+        int at = joint->begin;
         x->value[k] = joint->coordinate >= 0 ? q[joint->coordinate] : x->own[joint->value];
         x->drift[k] = joint->coordinate >= 0 ? b->drift[joint->coordinate] : x->own[joint->rate];
-        for (int e = 0; e < of->rates; e++)
-            if (of->rate_row[e] == joint->coordinate) x->H[k * of->nv + of->rate_column[e]] = b->B[e];
+        for (int e = 0; e < of->rates && joint->coordinate >= 0; e++)
+            if (of->rate_row[e] == joint->coordinate) x->H[at++] = b->B[e];
     }
-    for (int i = 0; i < of->nv; i++) {
-        x->part[i] = 1;
+    for (int group = 0; group < of->joint_groups; group++) {
+        for (int e = 0; e < of->joint_rates; e++) x->part[of->joint_rate[e].speed] = of->joint_rate[e].group == group;
         read_joints(s, q);
-        x->part[i] = 0;
         for (int k = 0; k < of->joint_count; k++)
-            if (of->joint[k].coordinate < 0) x->H[k * of->nv + i] = x->own[of->joint[k].rate] - x->drift[k];
+            for (int e = of->joint[k].begin; e < of->joint[k].end && of->joint[k].coordinate < 0; e++)
+                if (of->joint_rate[e].group == group) x->H[e] = x->own[of->joint[k].rate] - x->drift[k];
     }
 }
 
@@ -68,11 +82,13 @@ double joint_missing(Solver *s, const double *v) {
     const System *of = s->system;
     double most = 0;
     for (int k = 0; k < of->joint_count; k++) {
-        const double *H = x->H + k * of->nv, asked = x->asked[joint_place(s, k, x->of_rates)];
+        const double asked = x->asked[joint_place(s, k, x->of_rates)];
         double size = fabs(asked);
-        for (int i = 0; i < of->nv; i++)
-            size += fabs(H[i]) * (x->of_rates ? fmax(fabs(v[i]), fabs(x->asked[of->nq + i])) : s->state.span[i]);
-        x->miss[k] = asked - (x->of_rates ? x->drift[k] + dot(of->nv, H, v) : x->value[k]);
+        for (int e = of->joint[k].begin; e < of->joint[k].end; e++) {
+            const int i = of->joint_rate[e].speed;
+            size += fabs(x->H[e]) * (x->of_rates ? fmax(fabs(v[i]), fabs(x->asked[of->nq + i])) : s->state.span[i]);
+        }
+        x->miss[k] = asked - (x->of_rates ? x->drift[k] + joint_along(s, k, v) : x->value[k]);
         if (of->joint[k].within_turn && !x->of_rates) x->miss[k] -= TURN * round(x->miss[k] / TURN);
         x->size[k] = size;
         if ((int)joint_priority(s, k) >= x->least && size > 0) most = fmax(most, fabs(x->miss[k]) / size);
@@ -81,37 +97,83 @@ double joint_missing(Solver *s, const double *v) {
     return most;
 }
 
+/* part (nv) <- part + by H_k^T, of what moves. */
+static void push_joint(Solver *s, int k, double by) {
+    const struct JointSearch *x = s->joint_search;
+    const System *of = s->system;
+    for (int e = of->joint[k].begin; e < of->joint[k].end; e++) {
+        const int i = of->joint_rate[e].speed;
+        if (x->held[i] == OMITTED) x->part[i] += by * x->H[e];
+    }
+}
+
+/* y (nv) = P part, where nothing that is held moves. */
+static Status find_response(Solver *s) {
+    struct JointSearch *x = s->joint_search;
+    if (linear_nearest(&s->stepped.linear, x->part, x->zero, x->y, NULL) != OK) return FAILED;
+    for (int i = 0; i < s->system->nv; i++)
+        if (x->held[i] != OMITTED) x->y[i] = 0;
+    return OK;
+}
+
+/* H_k M^-1 H_k^T by M's diagonal: what the constraints and other joints would leave of it at most. */
+static double free_of(const Solver *s) {
+    const struct JointSearch *x = s->joint_search;
+    const System *of = s->system;
+    const double *M = s->stepped.M;
+    double whole = 0;
+    for (int e = 0; e < of->masses; e++) {
+        const int i = of->mass_row[e];
+        if (of->mass_column[e] == i && M[e] > 0) whole += x->part[i] * x->part[i] / M[e];
+    }
+    return whole;
+}
+
+/* Row k of A becomes that of L, with D_k at its end: 0 where nothing is left free, or it is not held. */
+static Status factor_joint(Solver *s, int k) {
+    struct JointSearch *x = s->joint_search;
+    double *row = row_of(x, k);
+    memset(x->part, 0, (size_t)s->system->nv * sizeof *x->part);
+    memset(row, 0, (size_t)(k + 1) * sizeof *row);
+    if ((int)joint_priority(s, k) < x->least) return OK;
+    push_joint(s, k, 1);
+    const double whole = free_of(s);
+    if (find_response(s) != OK) return FAILED;
+    double left = joint_along(s, k, x->y);
+    for (int j = 0; j < k; j++) {
+        const double *other = row_of(x, j);
+        if (other[j] > 0) row[j] = joint_along(s, j, x->y) - dot(j, other, row);
+    }
+    for (int j = 0; j < k; j++) {
+        const double D = row_of(x, j)[j];
+        if (!(D > 0)) continue;
+        left -= row[j] * row[j] / D;
+        row[j] /= D;
+    }
+    row[k] = left > DETERMINED * whole ? left : 0;
+    return OK;
+}
+
 Status joint_step(Solver *s, const int *rows) {
     struct JointSearch *x = s->joint_search;
     const System *of = s->system;
     Mechanism *b = &s->stepped;
     int *own = s->iwork_initial + of->m;
-    const int n = of->nv;
+    double *c = x->share;
     (void)priority_rows(of, x->held, OMITTED, rows, own);
     if (priority_nearest(b, x->held, OMITTED, own, x->c) != OK) return FAILED;
-    memcpy(x->d, b->dq, (size_t)n * sizeof *x->d);
+    memcpy(x->d, b->dq, (size_t)of->nv * sizeof *x->d);
     for (int k = 0; k < of->joint_count; k++) {
-        double *H = x->H + k * n, *y = x->Y + k * n, whole = 0;
-        memset(y, 0, (size_t)n * sizeof *y);
-        if ((int)joint_priority(s, k) < x->least) continue;
-        for (int i = 0; i < n; i++) x->part[i] = x->held[i] == OMITTED ? H[i] : 0;
-        for (int e = 0; e < of->masses; e++) {
-            const int i = of->mass_row[e];
-            if (of->mass_column[e] == i && b->M[e] > 0) whole += x->part[i] * x->part[i] / b->M[e];
-        }
-        if (linear_nearest(&b->linear, x->part, x->zero, y, NULL) != OK) return FAILED;
-        for (int i = 0; i < n; i++)
-            if (x->held[i] != OMITTED) y[i] = 0;
-        for (int j = 0; j < k; j++) {
-            const double *other = x->Y + j * n, along = dot(n, x->H + j * n, other);
-            if (along > 0) add_part(n, -dot(n, x->H + j * n, y) / along, other, y);
-        }
-        const double left = dot(n, H, y);
-        if (left > DETERMINED * whole)
-            add_part(n, (x->miss[k] - dot(n, H, x->d)) / left, y, x->d);
-        else
-            memset(y, 0, (size_t)n * sizeof *y);
+        if (factor_joint(s, k) != OK) return FAILED;
+        c[k] = x->miss[k] - joint_along(s, k, x->d) - dot(k, row_of(x, k), c);
     }
+    for (int k = 0; k < of->joint_count; k++) c[k] = row_of(x, k)[k] > 0 ? c[k] / row_of(x, k)[k] : 0;
+    memset(x->part, 0, (size_t)of->nv * sizeof *x->part);
+    for (int k = of->joint_count - 1; k >= 0; k--) {
+        add_part(k, -c[k], row_of(x, k), c);
+        push_joint(s, k, c[k]);
+    }
+    if (find_response(s) != OK) return FAILED;
+    add_part(of->nv, 1, x->y, x->d);
     return OK;
 }
-

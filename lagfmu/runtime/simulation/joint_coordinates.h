@@ -17,7 +17,8 @@ struct JointSearch {
     double *c, *d;                /* (m), (nv) of joint_step() */
     double *value, *drift;        /* (joint_count) h, h_t */
     double *miss, *size;          /* (joint_count) what is missing, and the size of its terms */
-    double *H, *Y;                /* (joint_count, nv) */
+    double *H;                    /* (joint_rates) */
+    double *A, *share, *y;        /* (joint_count (joint_count + 1) / 2), (joint_count), (nv) of joint_step() */
     double *part, *zero;          /* (nv), (nv + m) scratch, zeros */
     double *own, *other;          /* (output_count) */
 };
@@ -33,6 +34,9 @@ static inline int joint_place(const Solver *s, int k, int of_rates) {
 static inline Priority joint_priority(const Solver *s, int k) {
     return s->joint_search->priority[joint_place(s, k, s->joint_search->of_rates)];
 }
+
+/* H v of joint coordinate k. */
+SHARED double joint_along(const Solver *s, int k, const double *v);
 
 /* h, h_t and H at q. */
 SHARED void joint_measure(Solver *s, const double *q);

@@ -130,10 +130,11 @@ static void begin_without_joints(Solver *s) {
         double *asked = &x->asked[joint_place(s, k, 0)];
         const Priority *priority = &x->priority[joint_place(s, k, 0)];
         if (priority[0] != SET) asked[0] = x->value[k];
-        if (priority[1] != SET) asked[1] = x->drift[k] + dot(of->nv, x->H + k * of->nv, s->state.v);
-        for (int i = 0; i < of->nv; i++) {
+        if (priority[1] != SET) asked[1] = x->drift[k] + joint_along(s, k, s->state.v);
+        for (int h = of->joint[k].begin; h < of->joint[k].end; h++) {
+            const int i = of->joint_rate[h].speed;
             Priority *of_speed = &x->priority[of->nq + i];
-            if (x->H[k * of->nv + i] == 0) continue;
+            if (x->H[h] == 0) continue;
             if (priority[1] == SET && *of_speed == GIVEN) *of_speed = OMITTED;
             if (priority[0] != SET) continue;
             if (of->kinematics == NULL && x->priority[i] == GIVEN) x->priority[i] = OMITTED;

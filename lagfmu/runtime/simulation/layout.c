@@ -56,7 +56,10 @@ void solver_layout(Solver *s, Arena *saved, Arena *scratch, const System *system
     s->drive.second = arena_doubles(saved, system->inputs);
     s->p = arena_doubles(saved, system->parameters);
     s->peak = arena_doubles(saved, peaks_saved(s->peaks, s->peak_columns));
-    integrator_layout(&s->probe, scratch, scratch, width, states, OPTIONAL.methods, METHOD_COUNT);
+    Arena none = {NULL, 0}; /* the two never step within each other */
+    integrator_layout(&s->probe, scratch, &none, width, states, OPTIONAL.methods, METHOD_COUNT);
+    s->probe.scratch = s->integrator.scratch;
+    s->probe.pivots = s->integrator.pivots;
     mechanism_layout(&s->stepped, scratch, system, &s->why,
                      OPTIONAL.friction != NULL ? OPTIONAL.friction->sliding : NULL);
     if (OPTIONAL.friction != NULL) OPTIONAL.friction->attach(s);
