@@ -115,20 +115,19 @@ double ldlt_trace(const Elimination *e, const double *L, const double *D, const 
         if (acts != NULL && !acts[e->order[p]]) continue;
         for (int k = from; k < to; k++) { /* L_pi = y_i / D_i, D_p = A_pp - sum_i y_i^2 / D_i */
             const int i = e->column[k];
-            const double by_L = x->by_L[k] * D[i];
-            x->y[i] = L[k] / D[i];
-            x->by_y[i] = by_L - 2 * L[k] * own;
-            x->by_D[i] += L[k] * (L[k] * own - by_L);
+            x->l[i] = L[k];
+            x->by_y[i] = x->by_L[k] - 2 * L[k] * own;
+            x->by_D[i] += L[k] * (L[k] * own - x->by_L[k]);
         }
         for (int k = to - 1; k >= from; k--) { /* y_i = A_pi - sum_r L_ir y_r */
             const int i = e->column[k];
             const double by_y = x->by_y[i];
             for (int r = e->start[i]; r < e->start[i + 1]; r++) {
                 x->by_y[e->column[r]] -= L[r] * by_y;
-                x->by_L[r] -= x->y[e->column[r]] * by_y;
+                x->by_L[r] -= x->l[e->column[r]] * by_y;
             }
         }
-        for (int k = from; k < to; k++) x->y[e->column[k]] = 0;
+        for (int k = from; k < to; k++) x->l[e->column[k]] = 0;
     }
     return trace;
 }

@@ -24,10 +24,10 @@ typedef struct {
  * over, a row of A, by its own number, that is nothing but a 1 on the diagonal. */
 SHARED Definite ldlt_factor(const Elimination *e, double *L, double *D, const Bounds *own, const int *acts);
 
-/* Scratch of ldlt_trace(): derivatives of log det A by the elements of L (its pattern), D and y (size); y (size), zero
- * on entry and return. */
+/* Scratch of ldlt_trace(): derivatives of log det A by the elements of L (its pattern; over D of the column), D and y
+ * (size); a row of L (size), zero on entry and return. */
 typedef struct {
-    double *by_L, *by_D, *by_y, *y;
+    double *by_L, *by_D, *by_y, *l;
 } Reverse;
 
 /* sum_i A_ii (A^-1)_ii, the trace of the inverse of A scaled to a unit diagonal, from its factors L and D = 1 / D;

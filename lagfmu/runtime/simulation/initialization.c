@@ -239,7 +239,7 @@ SHARED void solver_clear(Solver *s, double t) {
     memset(state->block, 0, state->block_size);
     memset(&state->now, 0, sizeof state->now);
     state->now.t = t;
-    state->now.approach = (Approach){t, 1, -1, 0};
+    state->now.approach = (Approach){t, APART_UNKNOWN, -1, 0};
     state->now.fresh = 1;
 }
 

@@ -76,7 +76,7 @@ static void look(Solver *s, double t, const double *y) {
     Approach *x = &s->state.now.approach;
     const int dependent = s->state.now.dependent;
     const double h = t - x->t, before = x->apart;
-    if (!(h > 0)) return;
+    if (!(h > 0) && before != APART_UNKNOWN) return;
     const int known = s->stepped.linear.active == solver_rows(s); /* the factors are those of the rows of the step */
     if (dependent && !known && factor_there(s, t, y, DBL_MIN) != OK) return;
     const double apart = linear_apart(&s->stepped.linear);

@@ -39,6 +39,8 @@ SHARED void drive_at(const System *s, const Drive *drive, double t, double *u);
 /* How often, over a whole run, which may last for ever. */
 typedef long long Count;
 
+enum { APART_UNKNOWN = 2 }; /* before the first step */
+
 /* How a singular configuration is approached (passage.h): the time [s] of the latest step's beginning, how far the
  * rows were apart there (sine of an angle; negative: such a configuration has been passed since), whether
  * one is near, and in how many seconds (negative: behind). */
