@@ -120,6 +120,13 @@ def test_arrows_are_as_long_as_the_forces(page: Page) -> None:
             assert np.linalg.norm(force) > 0.1  # m
 
 
+def test_the_accuracy_of_a_mechanism_is_that_of_its_joints_forces_first(page: Page) -> None:
+    """The menu begins as the curves do; the multipliers of its rows come after."""
+    menu = page.tab.locator("#quantity option").all_text_contents()
+    assert menu[:2] == ["force.lower.norm", "force.upper.norm"]
+    assert "lambda.lower.x" in menu[2:]
+
+
 def test_something_is_to_be_seen(page: Page) -> None:
     """Bodies cover a part of the canvas, lit in many shades; at another time it is another picture."""
     seen = []

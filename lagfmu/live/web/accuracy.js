@@ -16,7 +16,9 @@ class Accuracy {
     this.quantity = byId("quantity");
     const groups = ["Multipliers λ", "Outputs", "Coordinates", "Velocities", "Energies"];
     const able = COLUMNS.filter((v) => v.type === "Real" && !v.discrete && groups.includes(v.group));
-    able.sort((a, b) => groups.indexOf(a.group) - groups.indexOf(b.group));
+    const first = FACTS.preset.curves; // with which the curves begin: of a mechanism the force in each joint
+    const rank = (v) => (first.includes(v.name) ? first.indexOf(v.name) : first.length + groups.indexOf(v.group));
+    able.sort((a, b) => rank(a) - rank(b));
     this.quantity.append(...able.map((v) => element("option", { value: v.name }, v.name)));
     this.quantity.addEventListener("change", () => this.draw());
     this.slider.addEventListener("input", () => {
