@@ -725,6 +725,14 @@ pin = Revolute("A", ground.at((0, 0)), arm.at((0, 0)))
             "b.mass: parameter 'm' is no SymPy symbol",
         ),
         (
+            {"bodies": [Body("b", Parameter(sympy.Symbol("m"), 1.0, "m"), 0.1)]},
+            "b.mass: parameter m has the unit 'm', expected kg",
+        ),
+        (
+            {"joints": [Revolute("A", Ground("floor").at((0, 0)), arm.at((0, 0)))]},
+            "its first marker is on the ground 'floor', expected 'ground'",
+        ),
+        (
             {
                 "joints": [
                     PointOnCurve("K", ground.at((0, 0)), arm.at((0, 0)), Track((1, 2), turn, 0, 1))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from math import pi
+from math import inf, pi
 from pathlib import Path
 
 import numpy as np
@@ -442,6 +442,12 @@ arm = Body("arm", 1.0, (0.1, 0.1, 0.1))
             "expected a direction, or a rotation: a right-handed orthogonal matrix",
         ),
         (
+            {"joints": [Fixed("A", ground.at((0, 0, 0), axis=(inf, 0, 0)), arm.at((0, 0, 0)))]},
+            "axis (inf, 0, 0) turns nothing, expected a direction",
+        ),
+        ({"bodies": [Body("b", 1.0, [[1, 0, 0]] * 3)]}, "expected three numbers (xx, yy, zz)"),
+        ({"start": {"arm.orientation": (0, 0, 0, 0)}}, "expected a quaternion of norm 1"),
+        (
             {"joints": [Revolute("A", ground.at((0, 0)), arm.at((0, 0, 0)))]},
             "A.first is (0, 0), expected 3 components (x, y, z)",
         ),
@@ -481,3 +487,16 @@ def test_what_is_wrong_with_a_mechanism_in_space_is_told_by_name(parts, told):
     with pytest.raises(ModelError) as caught:
         mechanism("M", **{"bodies": [arm], **parts})
     assert told in str(caught.value)
+
+
+def test_a_quaternion_that_is_given_with_another_norm_is_told():
+    """(0, 3, 0, 4) begins as (0, 0.6, 0, 0.8); three digits are rounding."""
+    with pytest.warns(
+        UserWarning, match=r"the norm 5, expected 1: it begins at \(0.0, 0.6, 0.0, 0.8\)"
+    ):
+        model = mechanism("M", bodies=[arm], start={"arm.orientation": (0, 3, 0, 4)})
+    begins = {str(q.func): x for q, x in model.start.items() if not q.is_Derivative}
+    assert [begins[f"arm.orientation.{x}"] for x in "wxyz"] == pytest.approx([0, 0.6, 0, 0.8])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        mechanism("M", bodies=[arm], start={"arm.orientation": (0.707, 0.707, 0, 0)})

@@ -19,13 +19,13 @@ import numpy as np
 import sympy as sp
 from sympy.core.function import AppliedUndef
 
-from ..errors import LagfmuWarning, ModelError
+from ..errors import ModelError
 from ..model.elements import Contact, Expr, Holonomic, Nonholonomic
 from ..model.model import Model
 from ..names import derivative
 from .branches import CLOSED, has_loop, is_small, other_angles, tell_second_branch
 from .draft import Draft
-from .given import Beginning, given_values, known_names
+from .given import Beginning, GivenStartWarning, given_values, known_names
 from .guess import guessed
 from .joints import CROSS
 from .moving import moving_of
@@ -33,10 +33,6 @@ from .rows import Array, Rows, condition
 
 PARALLEL = 0.99  # cosine of the axes of a universal joint
 EPS = float(np.finfo(float).eps)
-
-
-class GivenStartWarning(LagfmuWarning):
-    """A start value that was given, and cannot be."""
 
 
 @np.errstate(all="ignore")  # what is not finite is told

@@ -85,7 +85,11 @@ def _of_body(body: Body, planar: bool) -> Iterator[str]:
     masses = [("mass", body.mass, "kg")]
     if planar:
         masses.append(("inertia", body.inertia, "kg.m^2"))
-    elif not isinstance(body.inertia, Sequence) or len(body.inertia) not in (3, 6):
+    elif not (
+        isinstance(body.inertia, Sequence)
+        and len(body.inertia) in (3, 6)
+        and not any(isinstance(x, Sequence) for x in body.inertia)
+    ):
         yield (
             f"{what} has the inertia {body.inertia!r}, expected three numbers (xx, yy, zz) in kg.m^2, or six "
             "with xy, xz, yz; a mechanism of the plane says so: plane='xy'"
@@ -153,6 +157,11 @@ def _of_markers(part: Any, bodies: Sequence[Body], planar: bool) -> Iterator[str
     for field, marker in found.items():
         if not isinstance(marker, Marker):
             yield f"{what}: {field} is {marker!r}, expected a marker, as body.at((0.1, 0))"
+        elif isinstance(marker.body, Ground) and marker.body != Ground():
+            yield (
+                f"{what}: its {field} marker is on the ground {marker.body.name!r}, expected "
+                f"{Ground().name!r}: there is one ground"
+            )
         elif not isinstance(marker.body, Ground) and marker.body not in bodies:
             yield (
                 f"{what}: its {field} marker is on {getattr(marker.body, 'name', marker.body)!r}, which is "

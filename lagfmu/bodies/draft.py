@@ -15,6 +15,7 @@ import sympy as sp
 from sympy.core.function import AppliedUndef
 from sympy.physics.vector import dynamicsymbols
 
+from ..errors import UnitError
 from ..model.elements import (
     TIME,
     Constraint,
@@ -27,6 +28,7 @@ from ..model.elements import (
     is_number,
     name_of,
 )
+from ..model.units import parse_scaled, parse_unit
 from ..names import derivative
 from .body import Body, Ground, Marker
 from .motion import Motion, Placed, Timed, about
@@ -107,6 +109,7 @@ class Draft:
             )
             return sp.S.One
         if isinstance(value, Parameter):
+            self._check_unit(value, name, unit)
             self.parameters[value.symbol] = value
             return value.symbol
         if isinstance(value, sp.Basic) and value.free_symbols:
@@ -125,6 +128,17 @@ class Draft:
         symbol = sp.Symbol(name, positive=True) if positive else sp.Symbol(name, real=True)
         self.parameters[symbol] = Parameter(symbol, float(value), unit, text)
         return symbol
+
+    def _check_unit(self, parameter: Parameter, name: str, unit: str) -> None:
+        """What is no unit the Model tells."""
+        try:
+            given = parse_scaled(parameter.unit, name).unit
+        except UnitError:
+            return
+        if not given.same_dimension(parse_unit(unit, name)):
+            self.problems.append(
+                f"{name}: parameter {parameter.symbol} has the unit {parameter.unit!r}, expected {unit}"
+            )
 
     def vector(self, values: Any, name: str, unit: str, text: str = "") -> Vector:
         """Three components of as many values as the space has dimensions."""

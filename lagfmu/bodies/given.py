@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import difflib
 import re
+import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 import sympy as sp
 
-from ..errors import ModelError
+from ..errors import LagfmuWarning, ModelError
 from ..model.elements import TIME, Expr, is_number, name_of
 from ..model.model import Model
 from ..names import derivative
@@ -18,6 +19,12 @@ from .body import Body
 from .draft import Draft
 from .rotation import given_rotation, quaternion
 from .rows import Array
+
+ROUNDED = 1e-3  # of the norm of a quaternion that was written with few digits
+
+
+class GivenStartWarning(LagfmuWarning):
+    """A start value that was given, and cannot be."""
 
 
 class Beginning(NamedTuple):
@@ -84,7 +91,18 @@ def given_values(
         else:
             names = [name] if name in known else parts
             norm = float(np.linalg.norm(values)) if len(parts) == 4 else 1.0
-            found |= {n: float(x) / (norm or 1.0) for n, x in zip(names, values, strict=True)}
+            if norm == 0:
+                problems.append(f"start of {name!r} is {value!r}, expected a quaternion of norm 1")
+                continue
+            taken = {n: float(x) / norm for n, x in zip(names, values, strict=True)}
+            if abs(norm - 1) > ROUNDED:
+                warnings.warn(
+                    f"model {model.name!r}: start of {name} = {value!r} has the norm {norm:.6g}, expected 1: "
+                    f"it begins at {(*taken.values(),)!r}",
+                    GivenStartWarning,
+                    stacklevel=5,
+                )
+            found |= taken
     if problems:
         raise ModelError(model.name, problems)
     return found

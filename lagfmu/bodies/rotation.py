@@ -27,12 +27,18 @@ def problem_of(marker: Marker) -> str:
     if marker.axis is not None and marker.rotation is not None:
         return "it has a rotation and an axis: leave out one of them"
     try:
-        R = _oblique(marker.axis) if marker.axis is not None else given_rotation(marker.rotation)
+        with np.errstate(all="ignore"):  # what is not finite is told
+            R = (
+                _oblique(marker.axis)
+                if marker.axis is not None
+                else given_rotation(marker.rotation)
+            )
         R = np.array(R, dtype=float)
     except (TypeError, ValueError, ZeroDivisionError):
         R = np.zeros((3, 3))
     if (
         R.shape != (3, 3)
+        or not np.isfinite(R).all()
         or abs(np.linalg.det(R) - 1) > 1e-9
         or abs(R @ R.T - np.eye(3)).max() > 1e-9
     ):
