@@ -23,7 +23,7 @@ from conftest import MODELS
 from typer.testing import CliRunner
 
 import lagfmu
-from lagfmu.errors import LagfmuError, SimulationError
+from lagfmu.errors import LagfmuError, SettingError, SimulationError
 from lagfmu.testing import (
     LAST,
     MAX,
@@ -397,6 +397,33 @@ def test_a_table_as_csv_has_every_bit_and_its_units_beside_it(hemisphere, tmp_pa
     assert about["notes"][0]["fmu_sha256"] == digest
     again = lagfmu.sweep(hemisphere, rows={"theta": found["theta"], "a": found["a"]})
     assert (again["lambda.surface:max"].values[::2] == found["lambda.surface:max"][::2]).all()
+
+
+def test_the_rows_of_a_file_are_run_as_they_stand(hemisphere, tmp_path):
+    """A column a quantity, the method by its name, a line a run; of rows that are no grid the figure has a
+    panel for each cause of each number.  What is no number is named with its line."""
+    pd = pytest.importorskip("pandas")
+    file, figure, out = (tmp_path / n for n in ("rows.csv", "runs.svg", "runs.csv"))
+    file.write_text("theta, solver.method, a\n0.3, dop853, 1\n0.6, radau5, 2\n0.9, rk4, -1\n")
+    words = "--keep", "energy.total:last", "--plot", figure, "--out", out
+    done = CliRunner().invoke(app, ["sweep", *map(str, (hemisphere, "--from", file, *words))])
+    assert done.exit_code == 0, done.output
+    assert "3 runs, 1 refused" in done.output
+    found = pd.read_csv(out)["energy.total:last"]
+    alone = lagfmu.sweep(
+        hemisphere,
+        rows={"theta": [0.3, 0.6], "solver.method": ["dop853", "radau5"], "a": [1, 2]},
+        keep=["energy.total:last"],
+    )
+    assert (found[:2] == alone["energy.total:last"].values).all()
+    assert "1 refused (x)" in figure.read_text()
+    with pytest.raises(SettingError, match="rows: a: 'x' is no finite number"):
+        lagfmu.sweep(hemisphere, rows={"a": ["1", "x"]})
+    for text, told in (("theta\n0.3\nx\n", "theta in row 2 is 'x'"), ("theta\n", "no rows")):
+        file.write_text(text)
+        done = CliRunner().invoke(app, ["sweep", str(hemisphere), "--from", str(file)])
+        assert done.exit_code == 2
+        assert told in " ".join(done.output.split())
 
 
 def test_a_model_file_is_built_first(tmp_path):

@@ -34,7 +34,6 @@ from .elements import (
 )
 from .frictions import split
 from .kinds import check_containers
-from .reactions import reaction_units
 from .scaled import in_si
 from .spline import Spline
 from .units import Unit
@@ -127,11 +126,6 @@ class Model(ModelFields, Displayed):
     def splines(self) -> tuple[Spline, ...]:
         """The tables that stand in it, by name."""
         return tuple(splines_of(self))
-
-    @cached_property
-    def reactions(self) -> dict[Expr, Unit]:
-        """The unit of each `multiplier` and `force_of_constraint`."""
-        return reaction_units(self, self.units)
 
     @cached_property
     def limited(self) -> dict[str, Friction]:

@@ -36,7 +36,7 @@ from ...model.rule import Rule
 from ...model.scene import Scene
 from ...numeric.tolerance import tolerance_problem
 from ...verification.reference import Driven, driven
-from .design import Design, Values, design
+from .design import Design, Values, design, number
 from .engine import asked_to_stop, closed, connected, distributed, local
 from .keep import kept as parsed
 from .keep import peaked
@@ -305,8 +305,16 @@ def _design(
     table = None
     if rows is not None:
         names = tuple(rows.dtype.names if isinstance(rows, np.ndarray) else rows.keys())
-        table = (names, np.column_stack([np.asarray(rows[n], dtype=float) for n in names]))
+        table = (names, np.column_stack([_column(n, rows[n]) for n in names]))
     return design(vary, sample, runs, seed, sampling, table, memory())
+
+
+def _column(name: str, values: Any) -> NDArray[np.float64]:
+    """The numbers of a quantity; methods may be named."""
+    try:
+        return np.asarray(values, dtype=float)
+    except (TypeError, ValueError):
+        return np.array([number(str(v), name, f"rows: {name}") for v in values])
 
 
 def _times(path: Path, stop_time: float | None, step_size: float | None) -> NDArray[np.float64]:
