@@ -136,6 +136,7 @@ double bench_number(const Bench *b, const char *name) {
     const Numbers *now = &b->solver.state.now;
     if (strcmp(name, "evaluations") == 0) return evaluations;
     if (strcmp(name, "residuals") == 0) return residuals;
+    if (strcmp(name, "plain") == 0) return linear_plain(&b->solver.stepped.linear);
     return (double)now->rate;
 }
 

@@ -17,7 +17,7 @@ import pytest
 from impact_models import cradle
 from linkages import FOUR_BAR, TIME, rods
 from runtime import RUNTIME_FILES, compile_library
-from sympy import Rational, sin, symbols
+from sympy import Rational, cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import (
@@ -315,6 +315,43 @@ def test_projection_costs_two_evaluations_near_the_constraints(size, evaluations
     one.project([0.6 * (1 + size), -0.8], [0.4, 0.3], [1])
     assert one.number("evaluations") == evaluations
     assert one.number("residuals") == residuals
+
+
+@pytest.mark.filterwarnings("ignore::lagfmu.testing.RedundantConstraintWarning")
+def test_rows_that_others_hold_at_rest_need_no_orthogonal_factors(bench):
+    """A bar swings level on two strings of one length, and a third row says so again.  Its slip is rounding
+    of the other speeds: the rows that stand for all lead there by the Schur complement."""
+    d, height, turn = symbols("d", positive=True), *dynamicsymbols("height turn")
+    strings = [
+        (x + side * d * (cos(turn) - 1)) ** 2 + (height + side * d * sin(turn)) ** 2 - arm**2
+        for side in (-1, 1)
+    ]
+    one = bench(
+        Model(
+            name="LevelBar",
+            coordinates={x: "m", height: "m", turn: "rad"},
+            lagrangian=m * (x.diff() ** 2 + height.diff() ** 2) / 2
+            + J * turn.diff() ** 2 / 2
+            - m * g * height,
+            constraints=[
+                *(Holonomic(f"string{k}", f) for k, f in enumerate(strings)),
+                Holonomic("level", turn),
+            ],
+            parameters=[
+                MASS,
+                Parameter(g, 9.81, "m/s^2"),
+                Parameter(J, 0.1, "kg.m^2"),
+                Parameter(arm, 1.1, "m"),
+                Parameter(d, 0.4, "m"),
+            ],
+            start={x: 0.66, height: -0.88},
+        )
+    )
+    assert one.start([0.66, -0.88, 0.0], [0.8, 0.6, 0.0])
+    for off in np.linspace(1e-10, 1e-9, 10):
+        _, v = one.project([0.66, -0.88 + off, 0.0], [0.8, 0.6 + off, off], [1, 1, 1])
+        assert abs(v[2]) < 10 * EPS
+        assert one.number("plain")
 
 
 @pytest.mark.parametrize("tolerance", [1e-5, 1e-8, 1e-11])

@@ -6,6 +6,7 @@
 #include <float.h>
 
 #include "digits.h"
+#include "numbers.h"
 
 static const double AGREES = 1e-11; /* what rounding leaves of rows that follow from others, relative to its terms */
 
@@ -188,4 +189,32 @@ Status mechanism_motion_near(Mechanism *b, Instant at, const double *q, const do
     const Status status = mechanism_motion(b, at, q, v, active);
     b->linear.off = 0;
     return status;
+}
+
+double mechanism_largest_alike(const System *s, int dimension, const double *x) {
+    double largest = 0;
+    for (int i = 0; i < s->nv; i++)
+        if (s->speed_dimension[i] == dimension) largest = larger(largest, fabs(x[i]));
+    return largest;
+}
+
+void mechanism_motion_speeds(const Mechanism *b, const double *speed, double *shared) {
+    const System *s = b->system;
+    const int *dimension = s->speed_dimension;
+    double momentum = 0;
+    for (int e = 0; e < s->masses; e++)
+        if (s->mass_row[e] == s->mass_column[e] && b->M[e] > 0)
+            momentum = larger(momentum, sqrt(b->M[e]) * fabs(speed[s->mass_row[e]]));
+    for (int j = 0; j < s->nv; j++) shared[j] = -1; /* not known yet */
+    for (int j = 0; j < s->nv; j++) {
+        double heaviest = 0;
+        if (shared[j] >= 0) continue;
+        for (int e = 0; e < s->masses; e++)
+            if (s->mass_row[e] == s->mass_column[e] && dimension[s->mass_row[e]] == dimension[j])
+                heaviest = larger(heaviest, b->M[e]);
+        const double own = heaviest > 0 ? momentum / sqrt(heaviest) : 0;
+        const double largest = larger(own, mechanism_largest_alike(s, dimension[j], speed));
+        for (int i = j; i < s->nv; i++)
+            if (dimension[i] == dimension[j]) shared[i] = largest;
+    }
 }

@@ -167,6 +167,15 @@ SHARED Status mechanism_motion_near(Mechanism *b, Instant at, const double *q, c
  * acceleration, or the one that these could give it if they did not balance: what |vdot| is the rounding of. */
 SHARED void mechanism_at_work(const Mechanism *b, double *forces, double *reach);
 
+/* The largest magnitude of x (nv) among the speeds of a dimension. */
+SHARED double mechanism_largest_alike(const System *s, int dimension, const double *x);
+
+/* shared (nv): what speeds a whole motion has that moves each coordinate at `speed` (nv): the largest of
+ * its dimension; and, across dimensions, with the kinetic energy of the fastest for the heaviest of its
+ * own.  A coordinate may rest only because others, which move, hold it: what rounding leaves of its speed
+ * is rounding of theirs.  Of the masses that were evaluated last. */
+SHARED void mechanism_motion_speeds(const Mechanism *b, const double *speed, double *shared);
+
 /* The nearest state, in the metric of M, with f = offset and G v = nu on the rows that act; q and
  * v are moved in place.  For states that are nearly consistent; initialization.c deals with the others.
  * `span` (nv) are the magnitudes of what each speed moves, which say what rounding is.  On failure q and v are

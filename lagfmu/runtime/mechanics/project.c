@@ -123,13 +123,13 @@ static Status project_positions(Mechanism *b, Instant at, double *q, const doubl
     }
 }
 
-/* b->f <- nu - G v on the rows that act; 1 if it is at most so much of its terms. */
-static int is_rounding(Mechanism *b, const double *v, const int *active, double part) {
+/* b->f <- nu - G v on the rows that act; 1 if it is at most so much of its terms at these speeds (nv). */
+static int is_rounding(Mechanism *b, const double *v, const int *active, double part, const double *speed) {
     int rounding = 1;
     for (int k = 0; k < b->system->m; k++) {
         if (!active[k]) continue;
         b->f[k] = -mechanism_slip(b, k, v);
-        rounding &= fabs(b->f[k]) <= part * (mechanism_row_size(b, k, v) + fabs(b->nu[k]));
+        rounding &= fabs(b->f[k]) <= part * (mechanism_row_size(b, k, speed) + fabs(b->nu[k]));
     }
     return rounding;
 }
@@ -141,13 +141,15 @@ static Status correct_velocities(Mechanism *b, double *v, const int *rows) {
     return OK;
 }
 
-/* G v = nu on the rows that act: v is moved.  Nothing is left to do where the slip is rounding. */
+/* G v = nu on the rows that act: v is moved.  Nothing is left to do where the slip is rounding: once the rows of the
+ * basis lead there, that of the whole motion, for a row may stand between speeds that others hold at 0. */
 static Status project_velocities(Mechanism *b, double *v, const int *active) {
-    if (is_rounding(b, v, active, DBL_EPSILON)) return OK;
+    if (is_rounding(b, v, active, DBL_EPSILON, v)) return OK;
     if (b->basis != NULL) {
         take_basis(b, active);
         if (correct_velocities(b, v, b->pulls) == FAILED) return FAILED;
-        if (is_rounding(b, v, active, PROJECTION_ROUNDING)) return OK;
+        mechanism_motion_speeds(b, v, b->reach);
+        if (is_rounding(b, v, active, PROJECTION_ROUNDING, b->reach)) return OK;
     }
     return correct_velocities(b, v, active);
 }

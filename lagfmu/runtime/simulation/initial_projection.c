@@ -198,7 +198,7 @@ static int on_velocities(const Start *x, const double *least, const double *v, c
     double *shared = speed + s->nv;
     int on = 1;
     for (int j = 0; j < s->nv; j++) speed[j] = fmax(fmax(fabs(v[j]), fabs(x->v0[j])), least[j]);
-    nominals_motion_speeds(b, speed, shared);
+    mechanism_motion_speeds(b, speed, shared);
     for (int k = 0; k < s->m; k++) {
         slip[k] = -mechanism_slip(b, k, v);
         const double terms = mechanism_row_size(b, k, shared) + fabs(b->nu[k]);

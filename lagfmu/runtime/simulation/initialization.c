@@ -99,7 +99,7 @@ static Status check_velocities(const Start *x, const int *active, double *fastes
     int missed = 0;
     for (int j = 0; j < s->nv; j++)
         fastest[j] = fmax(fmax(fabs(x->v0[j]), fabs(v[j])), fastest[j]);
-    nominals_motion_speeds(b, fastest, shared);
+    mechanism_motion_speeds(b, fastest, shared);
     for (int k = 0; k < s->m; k++) {
         double unit = mechanism_row_size(b, k, shared) + fabs(b->nu[k]);
         if (!active[k] || fabs(mechanism_slip(b, k, v)) <= TOUCH * unit) continue;
@@ -159,7 +159,7 @@ static Status find_velocities(const Start *x) {
     if (check_masses(x) == FAILED) return FAILED;
     natural_speeds(x, natural);
     for (int j = 0; j < s->nv; j++) fastest[j] = fmax(fabs(x->v0[j]), natural[j]);
-    nominals_motion_speeds(b, fastest, shared);
+    mechanism_motion_speeds(b, fastest, shared);
     for (int c = 0; c < s->contacts; c++) {
         int k = s->contact[c];
         double speed = mechanism_slip(b, k, x->v0);

@@ -216,35 +216,6 @@ double nominals_pace(const Solver *s) {
     return pace;
 }
 
-/* The largest magnitude of x (nv) among the speeds of a dimension. */
-static double largest_alike(const System *s, int dimension, const double *x) {
-    double largest = 0;
-    for (int i = 0; i < s->nv; i++)
-        if (s->speed_dimension[i] == dimension) largest = larger(largest, fabs(x[i]));
-    return largest;
-}
-
-void nominals_motion_speeds(const Mechanism *b, const double *speed, double *shared) {
-    const System *s = b->system;
-    const int *dimension = s->speed_dimension;
-    double momentum = 0;
-    for (int e = 0; e < s->masses; e++)
-        if (s->mass_row[e] == s->mass_column[e] && b->M[e] > 0)
-            momentum = larger(momentum, sqrt(b->M[e]) * speed[s->mass_row[e]]);
-    for (int j = 0; j < s->nv; j++) shared[j] = UNTOLD;
-    for (int j = 0; j < s->nv; j++) {
-        double heaviest = 0;
-        if (shared[j] >= 0) continue;
-        for (int e = 0; e < s->masses; e++)
-            if (s->mass_row[e] == s->mass_column[e] && dimension[s->mass_row[e]] == dimension[j])
-                heaviest = larger(heaviest, b->M[e]);
-        const double own = heaviest > 0 ? momentum / sqrt(heaviest) : 0;
-        const double largest = larger(own, largest_alike(s, dimension[j], speed));
-        for (int i = j; i < s->nv; i++)
-            if (dimension[i] == dimension[j]) shared[i] = largest;
-    }
-}
-
 /* The least rate at which what has a size moves through it; 0 if none does. */
 static double slowest_rate(const Solver *s) {
     double slowest = 0;
@@ -269,8 +240,8 @@ static double find_own(Solver *s, double span, const double *felt, double *own) 
     for (int j = 0; j < system->nq; j++) own[j] = s->state.size[j] > 0 ? 0 : UNTOLD;
     for (int j = 0; j < system->nq; j++) {
         if (own[j] >= 0) continue;
-        const double speed = largest_alike(system, system->dimension[j], s->state.v);
-        double rate = larger(steady, speed > 0 ? largest_alike(system, system->dimension[j], felt) / speed : 0);
+        const double speed = mechanism_largest_alike(system, system->dimension[j], s->state.v);
+        double rate = larger(steady, speed > 0 ? mechanism_largest_alike(system, system->dimension[j], felt) / speed : 0);
         if (rate > 0) rate = larger(rate, slowest);
         rate = bounded(rate);
         natural = larger(natural, rate);
@@ -367,9 +338,9 @@ static void take_sizes(Solver *s, const double *felt, const double *own) {
     int taken = 0;
     for (int j = 0; j < system->nq; j++) {
         if (!(own[j] > 0) || s->state.size[j] > 0) continue;
-        const double speed = largest_alike(system, system->dimension[j], s->state.v);
-        double acceleration = largest_alike(system, system->dimension[j], b->vdot);
-        const double pull = largest_alike(system, system->dimension[j], felt);
+        const double speed = mechanism_largest_alike(system, system->dimension[j], s->state.v);
+        double acceleration = mechanism_largest_alike(system, system->dimension[j], b->vdot);
+        const double pull = mechanism_largest_alike(system, system->dimension[j], felt);
         if (acceleration <= LOST * pull) acceleration = pull; /* at rest: the rest is rounding */
         const double size = larger(speed / own[j], acceleration / own[j] / own[j]);
         for (int i = j; i < system->nq; i++)

@@ -11,12 +11,6 @@ SHARED void nominals_extents(const System *s, const double *p, double *least);
 /* state.size and state.span at q; 0 where there is none.  Before: the sizes before q was projected, or 0. */
 SHARED void nominals_sizes(Solver *s, Instant at, const double *q);
 
-/* shared (nv): what speeds a whole motion has that moves each coordinate at `speed` (nv) >= 0: the largest of
- * its dimension; and, across dimensions, with the kinetic energy of the fastest for the heaviest of its
- * own.  A coordinate may rest only because others, which move, hold it: what rounding leaves of its speed
- * is rounding of theirs.  Of the masses that were evaluated last. */
-SHARED void nominals_motion_speeds(const Mechanism *b, const double *speed, double *shared);
-
 /* shared (states): state.scale, no smaller than the scales and magnitudes in y of the coordinates that each
  * one can turn into by another choice of axes: those of its dimension with which a constraint or the mass
  * matrix ties it; angles with which a constraint does.  So the steps are the same in whatever frame. */
