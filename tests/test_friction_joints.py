@@ -537,6 +537,27 @@ def test_an_overhung_wheel_is_braked_by_the_edges_of_its_bearing_and_by_its_shou
     assert run["der(angle.A)"] == pytest.approx(5.0 - slowing * run["time"], rel=1e-10)
 
 
+def test_a_slide_that_rebounds_at_its_stop_sticks_there_in_the_end() -> None:
+    """A block slides down a rough incline of 0.8 rad onto a stop with e = 0.5: its rebounds follow each other
+    ever faster, T = e T, until it rests; the end of its last slide counts.  Guide and stop bear its weight
+    together, m g sin 0.8 [N]."""
+    ground, block = Base(), Body("block", 1.0, 0.01)
+    first, second = (on.at((0, 0), rotation=0.8) for on in (ground, block))
+    slide = Prismatic("K", first, second, friction=0.2, limits=(-0.2, 0.2), restitution=0.5)
+    model = mechanism(
+        "Stopped",
+        plane="xy",
+        bodies=[block],
+        joints=[slide],
+        loads=[Gravity((0, -9.81))],
+        start={"position.K": 0.1},
+    )
+    end = simulate(model, 2.0, 0.5)[-1]
+    assert end["closing.K.lower.count"] > 5
+    assert [end["sticks.K"], end["sticking.K.count"]] == [1, 1]
+    assert end["force.K.x"] == pytest.approx(9.81 * np.sin(0.8), rel=1e-9)
+
+
 def test_a_length_without_a_moment_to_take_is_refused() -> None:
     """In the plane a pin takes no moment; without friction no bearing is asked for."""
     crank = Body("crank", mass=1.0, inertia=0.1)

@@ -23,6 +23,7 @@ typedef struct {
     int *near;     /* an impact can reach it */
     int *struck;   /* it landed, or took an impulse */
     int *touching; /* f and df/dt are zero: the accelerations decide */
+    int low;       /* 1: of some that touch df/dt is not zero, but too low for them to part */
 } Flags;
 
 /* Speeds (m) of the rows that count as none, of the G that was evaluated last. */
@@ -107,7 +108,8 @@ static Status settle_modes(Solver *s, Instant at, Flags *x) {
     if (contacts_modes(s, at, q, v, x->closed, x->touching, x->departing) != OK) return FAILED;
     system_active(system, x->closed, s->active);
     if (mechanism_motion(&s->stepped, at, q, v, s->active) != OK) return FAILED;
-    if (!find_low(s, slow, shut, x)) return OK;
+    x->low = find_low(s, slow, shut, x);
+    if (!x->low) return OK;
     return contacts_modes(s, at, q, v, x->closed, x->touching, x->departing);
 }
 
@@ -151,9 +153,13 @@ Status modes_switch(Solver *s, const int *happened) {
     memset(s->push, 0, (size_t)contacts * sizeof *s->push);
     int *flags = s->iwork_events;
     Flags x = {flags, flags + contacts, flags + 2 * contacts, flags + 3 * contacts,
-               flags + 4 * contacts};
+               flags + 4 * contacts, 0};
     if (find_near(s, at, happened, &x) != OK || strike_contacts(s, at, happened, &x) != OK) return FAILED;
     if (settle_modes(s, at, &x) != OK || set_offsets(s, at, x.closed) != OK) return FAILED;
+    if (rubs && x.low) { /* what comes to rest may stick */
+        system_active(system, x.closed, s->active);
+        if (losses_project(s, at, 0) != OK) return FAILED;
+    }
     if (rubs && OPTIONAL.friction->change(s, at, happened + indicators_first_of_frictions(system),
                                         x.closed, x.touching, x.departing) != OK)
         return FAILED;
