@@ -223,3 +223,5 @@ def test_hinges_share_their_code_however_their_markers_are_turned() -> None:
     text = model_source(Form(derive(mechanism("Arm", bodies=arm.bodies, joints=arm.joints))))
     assert text.count("/* Of j2, j3, j4, j5, j6. */\nstatic void dynamics_kind_") == 1
     assert text.count("/* Of j2, j3, j4, j5, j6. */\nstatic void tangent_kind_") == 1
+    # so do the gyroscopic torques of bodies whose tensors have the same zeros
+    assert text.count("/* Of shoulder, wrist_2. */\nstatic void dynamics_kind_") == 1

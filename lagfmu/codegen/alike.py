@@ -20,7 +20,7 @@ from ..model.elements import Expr
 from ..names import read
 from .parts import Arguments, Value
 
-SMALL = 60  # different nodes of one owner's values that are not worth a function
+SMALL = 12  # different nodes of the values of one owner that are not worth a function
 DATA = "data"
 OF_JOINTS = frozenset(("angle", "position", "force", "torque"))  # what outputs and coordinates tell
 
