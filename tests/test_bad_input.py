@@ -803,11 +803,10 @@ def test_a_step_without_headway_ends(fmu):
 def test_a_run_that_cannot_be_is_refused(native_fmu, prepared, how, options, parts):
     """An unknown variable, a text for a number, a time that is none: of an FMU, and of a model in this
     process, in the same words."""
+    run, source = verify if how == "verify" else simulate, native_fmu("Atwood")
     if how == "in this process":
-        says(refusal(lambda: simulate(prepared("Atwood"), **options)), *parts)
-    else:
-        run = verify if how == "verify" else simulate
-        says(refusal(lambda: run(native_fmu("Atwood"), **options)), *parts)
+        source, options = prepared("Atwood"), options | {"target": "python"}
+    says(refusal(lambda: run(source, **options)), *parts)
 
 
 # ---------------------------------------------------------------------------- calls of the FMU

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import unicodedata
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from typer.testing import CliRunner
 import lagfmu
 from lagfmu import ClosedForm, Conserved, Result, Scene, output
 from lagfmu.bodies import Body, Ground, Revolute, Rolling, mechanism
-from lagfmu.testing import app, applies, carried, check_closed_form, console, load, moments, wrapped
+from lagfmu.testing import app, applies, carried, check_closed_form, console, moments, wrapped
 
 
 def simulated(*words: object) -> dict[str, list[str]]:
@@ -65,31 +66,31 @@ def test_no_line_that_show_prints_is_longer_than_the_terminal_is_wide(
     assert f"2 (x₈ - x₇) ẍ₈ + 2 (y₈ - y₇) ÿ₈ = {right}" in whole
 
 
-def test_a_departure_that_has_not_been_has_no_time() -> None:
+def test_a_departure_that_has_not_been_has_no_time(native_fmu: Any) -> None:
     """The particle leaves the hemisphere at 1.64 s: a run of 1 s knows no time and no place of it, one of 2 s
     does; nor does the table count the 0 before it as the smallest time."""
-    model = MODELS / "hemisphere.py"
+    model = native_fmu("Hemisphere")
     early, late = simulated(model, "--stop-time", 1), simulated(model)
     for n in ("departure.surface.time", "departure.surface.theta"):
         assert early[n][0] == "none"
         assert float(late[n][0]) > 0.8
     assert early["departure.surface.count"][0] == "0"
-    run = lagfmu.simulate(load(model).model, 2.0, 0.01)
+    run = lagfmu.simulate(model, 2.0, 0.01)
     row = next(r for r in run._rows() if r[0] == "departure.surface.time")
     assert row[1] == row[2] == row[3]
     assert float(row[1]) == pytest.approx(1.641, abs=1e-3)
 
 
-def test_units_are_written_as_people_write_them() -> None:
+def test_units_are_written_as_people_write_them(native_fmu: Any) -> None:
     """N·m, kg·m²: the same in tables, figures and pages; names for machines stay as FMI has them."""
-    run = lagfmu.simulate(model_file("incline_disk").model, 1.0, 0.25)
+    run = lagfmu.simulate(native_fmu("InclineDisk"), 1.0, 0.25)
     assert run.units["Q.theta"] == "N.m"
     assert "N·m" in repr(run)
     assert "N·m" in run._repr_html_()
     axes = run.plot("Q.theta", "y").axes
     assert [a.get_ylabel() for a in axes] == ["[N·m]", "[m]"]
     assert axes[-1].get_xlabel() == "time [s]"
-    assert simulated(MODELS / "incline_disk.py")["Q.theta"][1] == "N·m"
+    assert simulated(native_fmu("InclineDisk"))["Q.theta"][1] == "N·m"
 
 
 def test_a_zero_has_no_sign() -> None:
@@ -99,9 +100,9 @@ def test_a_zero_has_no_sign() -> None:
     assert "-0" not in repr(Result(table, {"x": "m"}, "Zero", "native"))
 
 
-def test_every_slip_is_marked_in_the_figure() -> None:
+def test_every_slip_is_marked_in_the_figure(native_fmu: Any) -> None:
     """The block on the belt slips again and again: a dashed line at each of the times that the run tells."""
-    run = lagfmu.simulate(model_file("belt").model, 3.0, 0.01)
+    run = lagfmu.simulate(native_fmu("Belt"), 3.0, 0.01)
     told = moments(run, "slipping.count", "grip")
     assert len(told) == run["slipping.grip.count"][-1] > 3
     assert told == sorted(set(told))
@@ -110,9 +111,9 @@ def test_every_slip_is_marked_in_the_figure() -> None:
     assert dashed == told
 
 
-def test_with_a_film_the_table_is_short(tmp_path: Path) -> None:
+def test_with_a_film_the_table_is_short(native_fmu: Any, tmp_path: Path) -> None:
     """What one looks for first; every row only without a file, and what -v names."""
-    model = MODELS / "hemisphere.py"
+    model = native_fmu("Hemisphere")
     whole = simulated(model, "--stop-time", 0.1)
     short = simulated(model, "--stop-time", 0.1, "--animate", tmp_path / "a.html")
     assert {"lambda.surface", "theta", "departure.surface.time"} <= short.keys() < whole.keys()
@@ -121,12 +122,12 @@ def test_with_a_film_the_table_is_short(tmp_path: Path) -> None:
     assert "energy.total" in named
 
 
-def test_a_landing_without_rebound_takes_energy() -> None:
+def test_a_landing_without_rebound_takes_energy(native_fmu: Any) -> None:
     """A ball that falls 1 m and stays: m g h is gone at sqrt(2 h/g) = 0.4515 s.  What is said of the energy
     holds until then where the losses are not known, at 46 points; who says himself where it holds (always)
     hears when it was missed first, and what happened there."""
     file = model_file("bouncing_ball")
-    run = lagfmu.simulate(file.model, start_values={"e": 0.0})
+    run = lagfmu.simulate(native_fmu("BouncingBall"), start_values={"e": 0.0})
     energy = output("energy.total")
     forms = [Conserved("energy", energy), Conserved("always", energy, when=1 + output("time"))]
     until, always = (
