@@ -559,6 +559,48 @@ def test_a_given_start_that_cannot_be_moves_and_is_told_with_both_numbers():
     assert acos(reach) < angle < acos(reach) + 0.05
 
 
+def blocks(**more):
+    """Of 9 kg and 1 kg on a line, the second begins 1 m behind the first; the start of the mechanism."""
+    one, two = Body("one", 9.0, 0.1), Body("two", 1.0, 0.1)
+    slides = [
+        Prismatic("A", ground.at((0, 0)), one.at((0, 0))),
+        Prismatic("B", ground.at((1, 0)), two.at((0, 0))),
+    ]
+    tied = Distance("L", one.at((0, 0)), two.at((0, 0)), 2.0)
+    model = plane(bodies=[one, two], joints=[*slides, *more.pop("ties", [tied])], **more)
+    return {str(name): value for name, value in model.start.items()}
+
+
+def test_what_is_not_given_moves_least_in_the_metric_of_the_masses():
+    """A rod of 2 m between two blocks that begin 1 m apart: nine tenths of the way are the lighter one's."""
+    begun = blocks()
+    assert begun["one.position.x(t)"] == pytest.approx(-0.1, abs=1e-12)
+    assert begun["two.position.x(t)"] == pytest.approx(1.9, rel=1e-12)
+
+
+def test_rates_that_contradict_each_other_give_way_to_the_joints():
+    """1 m/s of each where the first goes twice as fast as the second: told, and then v_1 = 2 v_2."""
+    start = {"der(position.A)": 1.0, "der(position.B)": 1.0}
+    with pytest.warns(UserWarning, match=r"der\(position\.[AB]\) = 1\.0 is "):
+        begun = blocks(ties=[Gear("G", "A", "B", ratio=2.0)], start=start)
+    v = [begun[f"Derivative({b}.position.x(t), t)"] for b in ("one", "two")]
+    assert v[0] == pytest.approx(2 * v[1], rel=1e-14)
+
+
+def test_a_branch_beyond_a_limit_is_none():
+    """A post of 1 m stands 1 m beside a rod of 1 m on a hinge, at +-60 degrees; where a stop forbids one of
+    them there is one way to close."""
+    for limits, ways in ((None, 2), ((-3.0, 0.0), 1)):
+        arm = Body("arm", 1.0, 0.1)
+        hinge = Revolute("A", ground.at((0, 0)), arm.at((-1, 0)), limits=limits)
+        with warnings.catch_warnings(record=True) as told:
+            warnings.simplefilter("always")
+            plane(
+                bodies=[arm], joints=[hinge, Distance("L", ground.at((1, 0)), arm.at((0, 0)), 1.0)]
+            )
+        assert ["two ways" in str(w.message) for w in told] == [True] * (ways - 1)
+
+
 @pytest.mark.parametrize("said_twice", [False, pytest.param(True, marks=pytest.mark.thorough)])
 def test_a_chain_of_seventy_links_begins_where_its_angles_say(said_twice, monkeypatch):
     """Link k at the angle phi_k = sum a_j is at sum of (cos, sin) phi_j less the half of its own, and moves

@@ -11,7 +11,16 @@ from scipy.linalg import expm
 from sympy.physics.mechanics import dynamicsymbols
 from tops import E, W, chain, reference, top, turning
 
-from lagfmu import Holonomic, Model, Nonholonomic, Parameter, derive, rotation_matrix, simulate
+from lagfmu import (
+    Holonomic,
+    Input,
+    Model,
+    Nonholonomic,
+    Parameter,
+    derive,
+    rotation_matrix,
+    simulate,
+)
 from lagfmu.errors import ModelError
 from lagfmu.testing import (
     Carried,
@@ -226,6 +235,24 @@ def test_kinematics_that_restrict_the_motion_are_refused() -> None:
     )
     with pytest.raises(ModelError, match="which so restrict the motion"):
         simulate(model, target="python", stop_time=0.1)
+
+
+def test_a_free_particle_is_not_pushed_by_a_scale_that_is_prescribed() -> None:
+    """x' = a(t) u with a = 1 + t/2: p = m a^2 u turns by a', and x = 0.3 t."""
+    a = dynamicsymbols("a")
+    model = Model(
+        "Scale",
+        coordinates={X: "m"},
+        speeds={U: "m/s"},
+        kinematics={X: a * U},
+        kinetic_energy=m * (a * U) ** 2 / 2,
+        inputs=[Input(a, "1", start=1.0, rate=0.5, rates="given")],
+        parameters=[Parameter(m, 2.0, "kg")],
+        start={U: 0.3},
+    )
+    run = simulate(model, target="python", stop_time=1.0, tolerance=1e-10)
+    np.testing.assert_allclose(run["x"], 0.3 * run["time"], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(run["u"], 0.3 / (1 + run["time"] / 2), rtol=0, atol=1e-9)
 
 
 def test_rotation_matrices_closed_or_written_out_are_the_same_equations() -> None:
