@@ -48,7 +48,7 @@ from lagfmu.prepare.steps import Request
 
 RUNS = 3
 TRIES = 5
-STEP = 1e-4  # s
+STEP = 0.02  # s
 Stages = Iterator[str | tuple[str, float]]
 
 
