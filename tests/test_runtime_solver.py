@@ -376,7 +376,9 @@ def test_a_start_with_rows_at_a_small_angle_looks_for_no_crossing(bench):
     most, where a search for the least angle within it takes 17 and more."""
     a, b, c, d = coordinates = dynamicsymbols("a b c d")
     light, heavy = symbols("light heavy", positive=True)
-    kinetic = (light * (a.diff() ** 2 + b.diff() ** 2) + heavy * (c.diff() ** 2 + d.diff() ** 2)) / 2
+    kinetic = (
+        light * (a.diff() ** 2 + b.diff() ** 2) + heavy * (c.diff() ** 2 + d.diff() ** 2)
+    ) / 2
     angle = 0.3
     one = bench(
         Model(
@@ -394,7 +396,12 @@ def test_a_start_with_rows_at_a_small_angle_looks_for_no_crossing(bench):
                 Parameter(g, 9.81, "m/s^2"),
                 Parameter(arm, 1.0, "m"),
             ],
-            start={a: np.sin(angle), b: -np.cos(angle), c: 2 * np.sin(angle), d: -2 * np.cos(angle)},
+            start={
+                a: np.sin(angle),
+                b: -np.cos(angle),
+                c: 2 * np.sin(angle),
+                d: -2 * np.cos(angle),
+            },
         )
     )
     q, v, _ = defaults(one.prepared.system, one.prepared.table)
