@@ -372,8 +372,8 @@ def test_an_event_costs_as_much_as_ten_steps(tolerance, bench):
 
 def test_a_start_with_rows_at_a_small_angle_looks_for_no_crossing(bench):
     """A light bob (1 g) above a heavy one (1 kg), both links in one line: the angle of the two rows in the
-    metric of M is 0.03 rad, and stays so.  The first step and the rates at its start take 12 evaluations each at
-    most, where a search for the least angle within it takes 17 and more."""
+    metric of M is 0.03 rad, and stays so.  The first step and the rates at its start take 12 evaluations each
+    at most, where a search for the least angle within it takes 17 and more."""
     a, b, c, d = coordinates = dynamicsymbols("a b c d")
     light, heavy = symbols("light heavy", positive=True)
     kinetic = (
