@@ -556,7 +556,69 @@ def test_a_given_start_that_cannot_be_moves_and_is_told_with_both_numbers():
     assert len(told) == 1
     reach = (0.7**2 - 0.45**2 - 0.4**2) / (2 * 0.45 * 0.4)  # crank and coupler in line
     angle = model.start[next(q for q in model.coordinates if q.name == "rocker.orientation.z")]
-    assert acos(reach) < angle < acos(reach) + 0.05
+    assert angle == pytest.approx(acos(reach), rel=1e-7)
+
+
+def _parallelogram(start):
+    """Links of 0.2, 0.5, 0.2 and 0.5 m; the rocker has three times the crank's moment of inertia."""
+    crank, coupler, rocker = parts = [
+        Body(n, 1.0, J) for n, J in (("crank", 0.01), ("coupler", 0.02), ("rocker", 0.03))
+    ]
+    joints = [
+        Revolute("A", ground.at((0, 0)), crank.at((-0.1, 0))),
+        Revolute("B", crank.at((0.1, 0)), coupler.at((-0.25, 0))),
+        Revolute("C", coupler.at((0.25, 0)), rocker.at((0.1, 0))),
+        Revolute("D", ground.at((0.5, 0)), rocker.at((-0.1, 0))),
+    ]
+    return plane(bodies=parts, joints=joints, start=start)
+
+
+def _two_wheels(start):
+    """The second wheel turns back at half the rate of the first, and has four times its moment of inertia."""
+    first, second = Body("first", 1.0, 0.01), Body("second", 1.0, 0.04)
+    pins = [Revolute("A", ground.at((0, 0)), first.at((0, 0)))]
+    pins += [Revolute("B", ground.at((1, 0)), second.at((0, 0))), Gear("mesh", "A", "B", -2.0)]
+    return plane(bodies=[first, second], joints=pins, start=start)
+
+
+def _arm_of_two(start):
+    """Two links of 1 m."""
+    upper, fore = Body("upper", 1.0, 0.01), Body("fore", 1.0, 0.02)
+    pins = [Revolute("A", ground.at((0, 0)), upper.at((-0.5, 0)))]
+    pins += [Revolute("B", upper.at((0.5, 0)), fore.at((-0.5, 0)))]
+    return plane(bodies=[upper, fore], joints=pins, start=start, read={"tip": fore.at((0.5, 0))})
+
+
+@pytest.mark.parametrize(
+    ("mechanism_of", "start", "nearest"),
+    [
+        (_arm_of_two, {"tip.position": (3.0, 4.0)}, {"tip.position.x": 1.2, "tip.position.y": 1.6}),
+        (
+            _parallelogram,
+            {"crank.orientation.z": 0.3, "rocker.orientation.z": 0.5},
+            {"crank.orientation.z": 0.45, "rocker.orientation.z": 0.45},
+        ),
+        (
+            _parallelogram,
+            {"angle.A": 0.3, "der(angle.A)": 3.0, "der(angle.D)": 5.0},
+            {"der(angle.A)": 4.5, "der(angle.D)": 4.5},
+        ),
+        (
+            _two_wheels,
+            {"angle.A": 3.0, "angle.B": 1.0},
+            {"angle.A": 0.5, "angle.B": -0.25},
+        ),
+    ],
+)
+def test_given_values_that_contradict_each_other_move_least(mechanism_of, start, nearest):
+    """An arm reaches towards a place beyond its 2 m; angles and rates that contradict each other meet at the
+    mean by their moments of inertia, (0.01 0.3 + 0.03 0.5)/0.04 and the like.  Each is told with both."""
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        mechanism_of(start)
+    moved = [re.search(r"start of (\S+) = \S+ is (\S+): the joints", str(w.message)) for w in told]
+    found = {m[1]: float(m[2]) for m in moved if m}
+    assert found == pytest.approx(nearest, rel=1e-6)
 
 
 def blocks(**more):
@@ -907,6 +969,24 @@ def test_a_motor_that_the_joints_cannot_follow_is_named_with_the_remedy():
         ModelError, match=r"motor 'M' prescribes .* by Motor\(\.\.\., start=\.\.\.\)"
     ):
         _lift(loads=[Motor("M", "L", motion=True, start=8.0)])
+
+
+def test_a_motor_that_prescribes_what_is_out_of_reach_hears_what_is_nearest():
+    """Crank and rocker of 0.3 m, a coupler of 0.4 m and pins 0.6 m apart: with coupler and rocker in line
+    the crank is at arccos(-1/9); the joints close, so that none of them is to blame."""
+    crank, coupler, rocker = parts = [Body(n, 1.0, 0.01) for n in ("crank", "coupler", "rocker")]
+    joints = [
+        Revolute("A", ground.at((0, 0)), crank.at((-0.15, 0))),
+        Revolute("B", crank.at((0.15, 0)), coupler.at((-0.2, 0))),
+        Revolute("C", coupler.at((0.2, 0)), rocker.at((-0.15, 0))),
+        Revolute("D", rocker.at((0.15, 0)), ground.at((0.6, 0))),
+    ]
+    drive = Motor("drive", "A", motion=True, start=3.0)
+    with pytest.raises(ModelError) as refused:
+        plane(bodies=parts, joints=joints, loads=[drive])
+    (problem,) = refused.value.problems
+    assert "motor 'drive' prescribes angle.A = 3 rad, which the joints cannot follow" in problem
+    assert f"the nearest that was found is {acos(-1 / 9):.6g} rad" in problem
 
 
 def test_a_joint_that_is_assembled_beyond_its_limits_is_told_with_its_place():

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -27,11 +27,11 @@ from .branches import CLOSED, has_loop, is_small, other_angles, tell_second_bran
 from .draft import Draft
 from .given import Beginning, GivenStartWarning, given_values, known_names
 from .guess import guessed
-from .joints import CROSS
 from .moving import moving_of
+from .nearest import Nearest
 from .rows import Array, Rows, condition
+from .unclosed import left_open, parallel, unfollowed
 
-PARALLEL = 0.99  # cosine of the axes of a universal joint
 EPS = float(np.finfo(float).eps)
 
 
@@ -60,7 +60,7 @@ def assemble(
     wanted = np.concatenate([np.zeros(len(closing)), np.array([*places.values()])])
     moving = moving_of(draft, model)
     rough = moving.tied(guessed(draft, model, parts, places), places)
-    if problems := list(_parallel([c.name for c in closing], f.values(rough))):
+    if problems := list(parallel(closing, f.values(rough))):
         raise ModelError(model.name, problems)
     size = moving.sized(rough)
     measures = {n: of.values[0] for n, of in draft.relative.items() if n not in places}
@@ -75,16 +75,14 @@ def assemble(
     if not at_once:
         q, missed = moving.closed([f, held], wanted, rough)
     if missed.max(initial=0.0) > CLOSED:
-        q, missed = min(from_other_angles(), key=lambda found: float(found[1].max(initial=0.0)))
+        begun = [(q, missed), *from_other_angles(), (rough, missed)]
+        q, missed = min(begun, key=lambda found: float(found[1].max(initial=0.0)))
+        if missed.max(initial=0.0) > CLOSED:
+            starts = [found for found, _ in begun]
+            q, missed = Nearest(moving, [f], held, np.array([*places.values()])).places(starts)
     if missed.max(initial=0.0) > CLOSED:
-        begun, asked = (q, rough), np.array([*places.values()])
-        tried = [moving.closed([f], np.zeros(len(closing)), start) for start in begun]
-        closed = [t for t in tried if t[1].max(initial=0.0) <= CLOSED] or tried
-        q, missed = min(closed, key=lambda t: float(np.linalg.norm(held.values(t[0]) - asked)))
-    if missed.max(initial=0.0) > CLOSED:
-        motors = {name for name, line in model.parts if line.startswith("motor")}
-        missing = _open([c.name for c in closing], f.values(q), missed, motors)
-        raise ModelError(model.name, list(missing))
+        problems = list(unfollowed(draft, model, parts, moving, closing, starts))
+        raise ModelError(model.name, problems or list(left_open(closing, f.values(q), missed)))
     _tell(model, places, held.values(q), size)
     _tell_beyond_limits(model, draft, parts, q)
     if is_small(draft) and (has_loop(draft, parts) or not at_once):
@@ -105,6 +103,10 @@ def assemble(
         still.append(Rows(model, [condition(model, c) for c in struck]))
         v = moving.velocities(still, np.zeros(len(acting) + len(struck)), q, v)
     found = driven.rates(q, v)
+    fastest = float(np.abs(found).max(initial=0.0))
+    if (np.abs(found - [*rates.values()]) > CLOSED * fastest).any():
+        v = Nearest(moving, still, driven, np.array([*rates.values()])).velocities(q, v)
+        found = driven.rates(q, v)
     _tell(model, rates, found, float(np.abs(found).max(initial=0.0)))
     fast = float(np.abs(v / moving.scale).max(initial=0.0))
     rounding = 4 * EPS * np.concatenate([np.full(len(q), size), moving.scale * fast])
@@ -140,59 +142,12 @@ def _spoken_of(model: Model, known: Mapping[str, Beginning], given: Iterable[str
     return found.union(*turned)
 
 
-def _parallel(names: Sequence[str], values: Array) -> Iterator[str]:
-    """Universal joints whose axes are parallel where they begin: which way they turn apart nobody says."""
-    for name, cosine in zip(names, values.tolist(), strict=True):
-        joint, _, row = name.partition(".")
-        if row == CROSS and abs(cosine) > PARALLEL:
-            apart = math.degrees(math.acos(min(abs(cosine), 1.0)))
-            yield (
-                f"the axes of universal joint {joint!r} begin {apart:.3g} degrees from parallel, expected "
-                "square: choose other axes (axis=, second_axis=), turn a marker, or give a body another "
-                "start, as its rpy"
-            )
-
-
 def _struck(model: Model, q: Array, v: Array, size: float) -> list[Contact]:
     """The contacts that touch at q and would be run into with v: they begin closed, without a blow."""
     contacts = [c for c in model.constraints if isinstance(c, Contact)]
     gaps = Rows(model, [condition(model, c) for c in contacts])
     found = zip(contacts, gaps.values(q), gaps.rates(q, v), strict=True)
     return [c for c, gap, rate in found if abs(gap) <= CLOSED * size and rate < 0]
-
-
-def _open(
-    names: Sequence[str], values: Array, missed: Array, motors: Collection[str]
-) -> Iterator[str]:
-    """Which joints miss, and which motors, the worst first."""
-    if not np.isfinite(values).all():
-        lost = {n.split(".")[0] for n, x in zip(names, values, strict=True) if not np.isfinite(x)}
-        for joint in sorted(lost):
-            yield f"joint {joint!r} has no finite value where it begins: start it elsewhere"
-        return
-    worst: dict[str, tuple[float, float]] = {}
-    by_name = dict(zip(names, values.tolist(), strict=True))
-    for name, value, miss in zip(names, values.tolist(), missed.tolist(), strict=True):
-        joint = name.split(".")[0]
-        worst[joint] = max(worst.get(joint, (0.0, 0.0)), (miss, abs(value)))
-    for joint, (miss, value) in sorted(worst.items(), key=lambda item: -item[1][0]):
-        if f"{joint}.{CROSS}" in by_name and miss > CLOSED:
-            off = math.degrees(math.asin(min(abs(by_name[f"{joint}.{CROSS}"]), 1.0)))
-            yield (
-                f"universal joint {joint!r} cannot be closed: at the nearest that was found its axes miss "
-                f"being square by {off:.3g} degrees: turn a marker, or choose other axes"
-            )
-        elif joint in motors and miss > CLOSED:
-            yield (
-                f"motor {joint!r} prescribes what the joints cannot follow: the nearest that was found "
-                f"misses it by {value:.3g} (m or rad): begin elsewhere, by motion= or, of an input, by "
-                "Motor(..., start=...)"
-            )
-        elif miss > CLOSED:
-            yield (
-                f"joint {joint!r} cannot be closed: the nearest that was found misses it by {value:.3g} "
-                "(m or rad): correct a length, or give a start nearer to where it closes"
-            )
 
 
 def _tell_beyond_limits(model: Model, draft: Draft, parts: Sequence[Any], q: Array) -> None:
@@ -217,8 +172,9 @@ def _tell(model: Model, given: Mapping[str, float], found: Array, size: float) -
     """Given values that had to move, with both numbers."""
     for (name, asked), is_now in zip(given.items(), found.tolist(), strict=True):
         if abs(is_now - asked) > CLOSED * max(abs(asked), size):
+            told = is_now if abs(is_now) > CLOSED * abs(asked) else 0.0
             warnings.warn(
-                f"model {model.name!r}: start of {name} = {asked!r} is {is_now!r}: the joints cannot be "
+                f"model {model.name!r}: start of {name} = {asked!r} is {told!r}: the joints cannot be "
                 "closed there",
                 GivenStartWarning,
                 stacklevel=5,

@@ -61,7 +61,7 @@ class Moving:
 
     def sized(self, q: Array) -> float:
         """The size of the mechanism at q [m], by which its lengths are judged from now on."""
-        straight = np.abs(self._slopes([self._moved], q)) @ self.lengths > 0
+        straight = np.abs(self.slopes([self._moved], q)) @ self.lengths > 0
         size = float(np.abs(q[straight]).max(initial=0.0)) or 1.0
         self.scale = np.where(self.lengths, size, 1.0)
         return size
@@ -79,7 +79,7 @@ class Moving:
 
     def moved(self, q: Array, d: Array) -> Array:
         """The coordinates after a movement."""
-        return self.tied(q + self._slopes([self._moved], q) @ d)
+        return self.tied(q + self.slopes([self._moved], q) @ d)
 
     def closed(self, rows: Sequence[Rows], wanted: Array, rough: Array) -> tuple[Array, Array]:
         """Coordinates at which the rows have the wanted values, and what each misses, relative to its size.
@@ -93,7 +93,7 @@ class Moving:
         found = [(q, missed), *self.closed_about(rows, wanted, rough)]
         there = [f for f in found if f[1].max() <= CLOSED]
         if there:
-            return min(there, key=lambda f: self._far(f[0], rough))
+            return min(there, key=lambda f: self.far(f[0], rough))
         return min(found, key=lambda f: float(f[1].max()))
 
     def closed_about(
@@ -118,10 +118,10 @@ class Moving:
         """From q on along the rows to where the movement from the rough place is least."""
         for _ in range(RETURNS):
             way = self._way(q, rough)
-            A = self._slopes(rows, q)
-            along = way + self._least(A, -(A @ way), self._sizes(A))
+            A = self.slopes(rows, q)
+            along = way + self.least(A, -(A @ way), self.sizes(A))
             new, left = self.newton(rows, wanted, self.moved(q, along))
-            if left.max() > CLOSED or self._far(new, rough) > (1 - LEAST) * self._far(q, rough):
+            if left.max() > CLOSED or self.far(new, rough) > (1 - LEAST) * self.far(q, rough):
                 break
             q, missed = new, left
         return q, missed
@@ -131,17 +131,17 @@ class Moving:
         to = to.copy()
         for place in self._quaternions:
             to[place] *= 1 if q[place] @ to[place] >= 0 else -1
-        B = self._slopes([self._moved], q)
+        B = self.slopes([self._moved], q)
         d: Array = np.linalg.lstsq(np.asarray(B @ np.eye(B.shape[1])), to - q, rcond=None)[0]
         return d
 
-    def _far(self, q: Array, rough: Array) -> float:
+    def far(self, q: Array, rough: Array) -> float:
         """How far a place is, in the metric of M."""
         return float(np.linalg.norm(self.weight * self._way(q, rough)))
 
     def determines(self, rows: Sequence[Rows], q: Array, measure: Rows) -> bool:
         """True if no motion that the rows leave changes the measure."""
-        held, wanted = (self._slopes(r, q) / self.weight for r in (rows, [measure]))
+        held, wanted = (self.slopes(r, q) / self.weight for r in (rows, [measure]))
         made = np.linalg.lstsq(held.T, wanted.T, rcond=STILL)[0]
         return bool(np.linalg.norm(wanted - made.T @ held) <= STILL * np.linalg.norm(wanted))
 
@@ -156,7 +156,7 @@ class Moving:
         for _ in range(STEPS):
             if np.abs(r / size).max(initial=0.0) <= enough:
                 break
-            step = self._least(A, r, size)
+            step = self.least(A, r, size)
             for halved in range(HALVINGS):
                 new = self.moved(q, step * 0.5**halved)
                 after = self._missed(rows, wanted, new)
@@ -170,20 +170,22 @@ class Moving:
     def _missed(self, rows: Sequence[Rows], wanted: Array, q: Array) -> tuple[Array, Any, Array]:
         """What is missing (m), the slopes (m, n_v), and how large a change each row sees (m)."""
         values, A = self._values_and_slopes(rows, q)
-        return wanted - values, A, self._sizes(A)
+        return wanted - values, A, self.sizes(A)
 
     def _values_and_slopes(self, rows: Sequence[Rows], q: Array) -> tuple[Array, Any]:
         values, slopes = zip(*(row.values_and_slopes(q) for row in rows), strict=True)
         return np.concatenate(values), np.vstack(slopes)
 
-    def _slopes(self, rows: Sequence[Rows], q: Array) -> Any:
+    def slopes(self, rows: Sequence[Rows], q: Array) -> Any:
+        """(m, n_v), of several rows."""
         return np.vstack([row.slopes(q) for row in rows])
 
-    def _sizes(self, A: Any) -> Array:
+    def sizes(self, A: Any) -> Array:
+        """How large a change each row sees (m)."""
         size = np.abs(A * self.scale).max(axis=1, initial=0.0)
         return np.where(size > 0, size, 1.0)
 
-    def _least(self, A: Any, r: Array, size: Array) -> Array:
+    def least(self, A: Any, r: Array, size: Array) -> Array:
         """d with A d = r as nearly as can be, each row by its size, and least among those."""
         A, r = A / size[:, None], r / size
         d: Array = np.linalg.lstsq(A / self.weight, r, rcond=REDUNDANT)[0] / self.weight
@@ -191,25 +193,25 @@ class Moving:
 
     def velocities(self, rows: Sequence[Rows], wanted: Array, q: Array, v: Array) -> Array:
         """The velocities nearest to v at which the rows have the wanted rates."""
-        A = self._slopes(rows, q)
+        A = self.slopes(rows, q)
         missing = wanted - np.concatenate([r.drifts(q) for r in rows]) - A @ v
-        return v + self._least(A, missing, self._sizes(A))
+        return v + self.least(A, missing, self.sizes(A))
 
 
 class _MovingMuch(Moving):
     """Those of a mechanism with many speeds, by sparse algebra."""
 
     def _values_and_slopes(self, rows: Sequence[Rows], q: Array) -> tuple[Array, Sparse]:
-        return np.concatenate([row.values(q) for row in rows]), self._slopes(rows, q)
+        return np.concatenate([row.values(q) for row in rows]), self.slopes(rows, q)
 
-    def _slopes(self, rows: Sequence[Rows], q: Array) -> Sparse:
+    def slopes(self, rows: Sequence[Rows], q: Array) -> Sparse:
         return vstack([row.sparse_slopes(q) for row in rows], format="csr")
 
-    def _sizes(self, A: Sparse) -> Array:
+    def sizes(self, A: Sparse) -> Array:
         size = row_sizes(A.tocoo(), self.scale, np.ones(A.shape[0]))
         return np.where(size > 0, size, 1.0)
 
-    def _least(self, A: Sparse, r: Array, size: Array) -> Array:
+    def least(self, A: Sparse, r: Array, size: Array) -> Array:
         """Rows may depend on each other: each may be missed by a slack s, least in d^2 + s^2 with
         A d + YIELDING |row| s = r, over and over for what is left (iterated Tikhonov regularization; Hansen,
         Rank-Deficient and Discrete Ill-Posed Problems, sect. 5.1)."""
