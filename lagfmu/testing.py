@@ -1,148 +1,30 @@
-"""What tests need of lagfmu's inside, in one place: a module that moves breaks this file alone.
+"""What tests need of lagfmu's inside, in one place: a module that moves breaks testing.pyi alone.
 
-What users need is in `lagfmu`.
+What users need is in `lagfmu`.  Each name is imported when it is first asked for: a process that a test
+starts needs one or two.
 """
 
-from .bodies.solid import solid
-from .cli import film
-from .cli import stress as stress_command
-from .cli.app import COMMANDS, app
-from .cli.progress import told
-from .cli.stress import stress
-from .cli.terminal import console
-from .codegen.c import elimination
-from .codegen.c import function as c_function
-from .codegen.c.elimination import Elimination, eliminate, plan
-from .codegen.c.equations import model_source
-from .codegen.c.printer import HELPERS, identifiers, number, string
-from .codegen.c.solve import solve_source
-from .codegen.py.equations import lower
-from .fmu import archive, compiler, described
-from .fmu import target as targets
-from .fmu.archive import version as archive_version
-from .fmu.batch import LAST, MAX, MEAN, TIME_OF_MAX, Plan, in_session, run_batch
-from .fmu.bundle import bundled, reached, unbundled
-from .fmu.closed_forms import CarriedForm, carried, pack_closed_forms, unpack_closed_forms
-from .fmu.compiler import NAMES, PLATFORMS, chosen, compile_libraries, find_compiler, host
-from .fmu.description import model_description
-from .fmu.description3 import build_description
-from .fmu.face import Face
-from .fmu.native import GENERATED, sources_of
-from .fmu.read import (
-    Trajectory,
-    communication_points,
-    described_rules,
-    file_stem,
-    read_description,
-    target_in,
-)
-from .fmu.session import RefusalError, Session
-from .fmu.target import NoCompilerWarning
-from .fmu.terminals import terminals
-from .fmu.write import as_built, write
-from .interface.rules import problems_of
-from .live import moving, solids, view, wasm
-from .live.icon import icon
-from .live.moving import Moving
-from .live.playable import playable, told_by
-from .live.render import Playable, render
-from .mechanics import simplification
-from .mechanics.form import Form
-from .mechanics.formulations.minimal import reduce
-from .mechanics.formulations.nullspace import lambda_free, null_space
-from .mechanics.integrability.classify import Kind, pfaffian
-from .mechanics.jumps import jumps_of, with_jumps
-from .model.attitude import Carried, rotation_matrix, written_out
-from .model.differential import Differential
-from .model.dimensions import check_dimension, dimension_of
-from .model.elements import TIME
-from .model.expression import LONGEST_SUM, read_formula, text_of
-from .model.file import ModelFile, load
-from .model.formula import with_outputs
-from .model.goal import Goal
-from .model.goal import parse as parse_goal
-from .model.library import known
-from .model.model import name_of
-from .model.named import read_named
-from .model.spline import SplineBase
-from .model.symbols import plain
-from .model.units import (
-    ENERGY,
-    METRE,
-    ONE,
-    POWER,
-    SECOND,
-    Unit,
-    generalized_force_unit,
-    multiplier_unit,
-    parse_quantity,
-    parse_unit,
-)
-from .numeric import thresholds
-from .numeric.failure import StepFailureError
-from .numeric.initialization import Stage
-from .numeric.linear import solve as solve_at_start
-from .numeric.start_priority import GIVEN, OMITTED
-from .numeric.system import System
-from .page.documentation import page as documentation_page
-from .page.documentation import with_figures
-from .page.notation import Notation, name_latex, name_text
-from .page.packed import pack as pack_picture
-from .page.packed import values as picture_values
-from .page.picture import as_bytes, direction, picture_of, read_picture
-from .page.preset import IN_FMU, preset_of, read_preset
-from .page.savings import NATIVE, OPERATIONS, savings
-from .page.table import print_whole
-from .page.text import show as show_in
-from .page.typeset import typeset
-from .page.wrapped import wrapped
-from .prepare.consistency import RedundantConstraintWarning
-from .prepare.prepare import Prepared, prepare
-from .prepare.starts import StartMovedWarning
-from .report import pdf as report_pdf
-from .study.fit import solve as fit_solve
-from .study.sensitivity.local import sensitivity
-from .study.sensitivity.ranges import over_ranges
-from .study.stress import runs, worker
-from .study.stress.bench import Bench, Finding
-from .study.stress.closed_forms import judged, magnitude
-from .study.stress.facts import facts_of
-from .study.stress.judge import Check, sizes_of
-from .study.stress.lagrange import lagrange, lay_beside
-from .study.stress.player import Run, clear
-from .study.stress.player import opened as session_of
-from .study.stress.probe import (
-    CONSISTENT,
-    REFUSED,
-    RIGHT,
-    UNFINISHED,
-    WRONG,
-    Probe,
-    Verdict,
-    attempt,
-    verdict,
-)
-from .study.stress.probes import probes
-from .study.stress.report import NO_WORRY, VERDICTS, WORRY, Stressed
-from .study.stress.runs import departures, started
-from .study.sweep import engine
-from .study.sweep.design import axis, design, distribution, sampled
-from .study.sweep.parts import PartWarning
-from .study.sweep.process import SessionProcess
-from .study.sweep.table import happened
-from .study.tradeoff.choose import choose
-from .study.tradeoff.held_out import other_values
-from .study.tradeoff.measure import Plan as TradeoffPlan
-from .study.tradeoff.measure import Point, Tradeoff, measure
-from .study.tradeoff.observe import observe, opened
-from .study.tradeoff.quantities import OWN, quantities
-from .study.tradeoff.reference import refer
-from .study.tradeoff.report import table as tradeoff_table
-from .study.tradeoff.setting import Setting
-from .verification.closed_forms import applies, check_closed_form, landed
-from .verification.evaluate import Compiled
-from .verification.exit_codes import EXIT_CODES, NOT_RUN, TERMINATED, WRONG_USAGE
-from .verification.plot import COLOURS, figure_of, moments, panels
-from .verification.reference import read_table
-from .verification.simulate import ErrorBarWarning
-from .verification.verify import RECORD
+from __future__ import annotations
+
+import ast
+import importlib
+from pathlib import Path
+from typing import Any
+
+PLACES = {
+    alias.asname or alias.name: (f"lagfmu.{node.module}", alias.name)
+    for node in ast.parse(Path(__file__).with_suffix(".pyi").read_text("utf-8")).body
+    if isinstance(node, ast.ImportFrom)
+    for alias in node.names
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in PLACES:
+        raise AttributeError(f"lagfmu.testing hands on no {name!r}: see testing.pyi")
+    module, own = PLACES[name]
+    home = importlib.import_module(module)
+    if not hasattr(home, own):
+        importlib.import_module(f"{module}.{own}")
+    found = globals()[name] = getattr(home, own)
+    return found
