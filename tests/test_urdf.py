@@ -80,6 +80,13 @@ def test_a_marker_lays_z_along_the_axis_of_the_file() -> None:
         np.testing.assert_allclose(np.array(marker.rotation)[:, 2], [0, 0.6, 0.8], atol=1e-15)
 
 
+def test_a_marker_is_turned_onto_minus_z_by_half_a_turn_about_y(tmp_path: Path) -> None:
+    """Where no rotation is the least, the one that the documentation names."""
+    down = joint("j", "base", "a").replace("0 0 1", "0 0 -2")
+    (hinge,) = from_urdf(robot(tmp_path, BASE, link("a"), down)).joints
+    np.testing.assert_allclose(hinge.first.rotation, np.diag([-1, 1, -1]), atol=1e-15)
+
+
 def test_a_joint_behind_a_link_without_mass_stands_where_both_origins_put_it(
     tmp_path: Path,
 ) -> None:

@@ -202,10 +202,12 @@ def named(name: str, vector: Vector) -> dict[str, float]:
 
 
 def least(axis: Point) -> Vector:
-    """The rotation about a line across both that turns z onto an axis."""
+    """The rotation about a line across both that turns z onto an axis; onto -z about y."""
     if not len(axis):
         return np.eye(3)
     e = np.asarray(axis) / np.linalg.norm(axis)
+    if e[2] == -1:
+        return np.diag([-1.0, 1.0, -1.0])
     K = cross(np.cross((0, 0, 1), e))
     return np.eye(3) + K + K @ K / (1 + e[2])
 
