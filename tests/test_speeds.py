@@ -112,6 +112,33 @@ def test_a_free_particle_moves_straight_over_a_turntable_that_speeds_up() -> Non
     np.testing.assert_allclose(run["vr"] + 1j * run["vt"], (0.3 + 0.7j) * back, rtol=0, atol=1e-9)
 
 
+@pytest.mark.parametrize("target", TARGETS)
+def test_a_belt_that_an_input_moves_carries_inertia(target: str) -> None:
+    """x' = u + w with the speed u of a block relative to a belt at w(t) = a t, that holds it by a rod (y = x)
+    to another: T = m (x'^2 + y'^2)/2, so that both go on at their own speed, and the FMU knows w' = a."""
+    w = dynamicsymbols("w")
+    model = Model(
+        "Belted",
+        coordinates={X: "m", Y: "m"},
+        speeds={U: "m/s"},
+        kinematics={X: U + w},
+        kinetic_energy=m * (X.diff() ** 2 + Y.diff() ** 2) / 2,
+        forces={U: k},
+        constraints=[Holonomic("rod", X - Y)],
+        inputs=[Input(w, "m/s")],
+        parameters=[Parameter(m, 2.0, "kg"), Parameter(k, 3.0, "N")],
+    )
+    t = np.linspace(0, 1, 11)
+    moved = {"time": t, "w": 5.0 * t, "der(w)": np.full(11, 5.0), "der(w,2)": np.zeros(11)}
+    table = np.array(
+        list(zip(*moved.values(), strict=True)), dtype=[(name, float) for name in moved]
+    )
+    run = simulate(model, target=target, stop_time=1.0, step_size=0.1, inputs=table)
+    np.testing.assert_allclose(run["x"], 3.0 / 4 * run["time"] ** 2 / 2, rtol=0, atol=1e-10)
+    np.testing.assert_allclose(run["lambda.rod"], -1.5, rtol=1e-10)
+    np.testing.assert_allclose(run["der(u)"], 0.75 - 5.0, rtol=1e-10)
+
+
 @pytest.mark.parametrize("lever", [1, 2])
 def test_a_force_may_lag_behind_the_motion(lever: int) -> None:
     """What no speed moves is no direction of motion: m x'' = -k z with z' = (x - z)/tau, whatever

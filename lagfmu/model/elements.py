@@ -38,9 +38,9 @@ class Parameter:
 class Input:
     """A quantity that the importer drives: a force, a torque, or a prescribed motion u(t).
 
-    A dynamicsymbol that stands in a constraint or a contact is a prescribed motion: the FMU then has the
-    inputs `u`, `der(u)` and `der(u,2)`, because the constraint on accelerations needs them (of one on
-    velocities x' = w the first).  `start` and `rate` [unit/s] are its value and its velocity until the
+    A dynamicsymbol that stands in a constraint, a contact or `kinematics` is a prescribed motion: the FMU
+    then has the inputs `u`, `der(u)` and `der(u,2)`, because the constraint on accelerations needs them (of
+    one on velocities x' = w the first).  `start` and `rate` [unit/s] are its value and its velocity until the
     importer sets them.  With `rates` = 'estimated' the FMU has the input `u` alone, and takes the
     derivatives from its values at the communication points.
     """
@@ -221,8 +221,8 @@ class ModelFields:
     def prescribed(self) -> tuple[Input, ...]:
         """Inputs whose first and second derivative the equations need."""
         used: set[Expr] = set(self.energy_expression.atoms(AppliedUndef))
-        for constraint in self.constraints:
-            used |= sp.sympify(constraint.expression).atoms(AppliedUndef)
+        for expression in (*self.kinematics.values(), *(c.expression for c in self.constraints)):
+            used |= sp.sympify(expression).atoms(AppliedUndef)
         for relation in self.embedding.relations.values() if self.embedding else ():
             used |= sp.sympify(relation).atoms(AppliedUndef)
         return tuple(i for i in self.inputs if i.symbol in used)

@@ -82,8 +82,8 @@ def _derivatives(model: ModelFields, what: str, expression: Expr) -> Iterator[st
             )
         elif d.expr in {i.symbol for i in model.inputs} - prescribed:
             yield (
-                f"{what}: holds {plain(d)}, but only an input that stands in a constraint (a "
-                "prescribed motion) has derivatives: make the rate an Input of its own"
+                f"{what}: holds {plain(d)}, but only an input that stands in a constraint or in "
+                "kinematics (a prescribed motion) has derivatives: make the rate an Input of its own"
             )
 
 
