@@ -20,7 +20,7 @@ from linkages import hinged
 from runs import evenly, simulate_fmu, sources
 
 from lagfmu import Model, Scene, verify
-from lagfmu.bodies import Body, Ground, Motor, Revolute, mechanism
+from lagfmu.bodies import Body, Gravity, Ground, Motor, Revolute, mechanism
 from lagfmu.testing import load
 
 R, L = 0.2, 0.5  # crank and rod of models/slider_crank_bodies.py [m]
@@ -271,6 +271,20 @@ def test_a_chain_is_set_by_all_its_angles_at_once(built: Any) -> None:
         names = (form.format(f"b{k}.position.{c}") for form in ("{}", "der({})") for c in "xz")
         assert [found[name] for name in names] == pytest.approx(at, rel=1e-12, abs=1e-12)
         x, z, vx, vz = (2 * end - begin for end, begin in zip(at, (x, z, vx, vz), strict=True))
+
+
+def test_a_flap_that_rests_on_its_stop_is_set_away_from_it(built: Any) -> None:
+    """At -0.5 rad the stop carries it; at 0.3 rad it is let go, where nothing does."""
+    flap = Body("flap", 2.0, 0.05)
+    hinge = Revolute("A", ground.at((0, 0)), flap.at((-0.3, 0)), limits=(-0.5, 2.0))
+    parts = {"plane": "xy", "bodies": [flap], "joints": [hinge], "start": {"angle.A": -0.5}}
+    fmu = built(mechanism("Flap", **parts, loads=[Gravity((0, -9.81))]))
+    resting, let_go = first(fmu, {}), first(fmu, {"angle.A": 0.3})
+    assert resting["contact.A.lower"]
+    assert resting["torque.A.z"] == pytest.approx(2.0 * 9.81 * 0.3 * cos(0.5), rel=1e-12)
+    assert let_go["angle.A"] == pytest.approx(0.3, rel=1e-14)
+    assert not let_go["contact.A.lower"]
+    assert let_go["torque.A.z"] == 0
 
 
 def test_an_angle_that_a_motor_prescribes_is_no_start(built: Any, native_fmu: Fmu) -> None:
