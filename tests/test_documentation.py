@@ -134,6 +134,15 @@ def test_names_are_written_as_in_the_textbook():
     assert name_text("jack.position") == "jack.position"  # the input of a motor in a slide
 
 
+def test_what_is_too_long_to_print_is_counted_and_not_made_shorter(monkeypatch):
+    """Common factors of a bicycle's inertias took 20 s, for entries of which the page says their length."""
+    a, b = symbols("a b")
+    long = sp.Add(*(a**k * sin(k * b) for k in range(1, 200)))
+    monkeypatch.setattr(sp, "factor_terms", lambda e: pytest.fail("was made shorter"))
+    [(_, text)] = Notation(derive(turned)).linear([(long, b)])
+    assert "operations, not printed]" in text
+
+
 def test_markup_in_descriptions_is_shown_as_it_stands(text):
     """`<b>` and `&` are characters of a description, not of the page."""
     assert "A cart &amp; a &lt;b&gt;pendulum&lt;/b&gt;" in text

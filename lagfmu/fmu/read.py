@@ -66,7 +66,7 @@ def obstacle(path: Path, description: Any) -> str:
     if here is None:
         return f"is an FMU of FMI {version}, expected FMI 2.0 or 3.0"
     if description.coSimulation is None:
-        return "has no co-simulation"
+        return "has no co-simulation: run it in an importer that integrates, as fmpy does"
     found = platforms(path)
     if here in found:
         return ""

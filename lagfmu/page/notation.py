@@ -174,7 +174,8 @@ class Notation:
         for a, symbol in terms:
             if a == 0:
                 continue
-            product = sp.factor_terms(a) if a.is_Add else a
+            short = a.is_Add and a.count_ops() <= LONGEST  # what is longer is only counted
+            product = sp.factor_terms(a) if short else a
             if sum(not b.is_Number for b in sp.Mul.make_args(product)) > 1:
                 a = product  # m (cos(theta) + 1) rather than m cos(theta) + m
             if a.is_Number or (a.is_Mul and a.args[0].is_Rational and a.args[0].q != 1):
