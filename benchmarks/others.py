@@ -70,11 +70,11 @@ def our_fmu(problem: Problem, out: Path) -> tuple[Path, Ours, list[str], Read]:
 
 
 def from_c(
-    problem: Problem, fmu: Ours, names: list[str], read: Read, tolerance: float
+    problem: Problem, fmu: Ours, names: list[str], read: Read, tolerance: float, method: str = ""
 ) -> tuple[Any, float]:
     """Forces, and us of one run, in the C host."""
     step = problem.step
-    command = fmu.command(tolerance, step, names, step=step, stop=problem.stop)
+    command = fmu.command(tolerance, step, names, method, step, stop=problem.stop)
     answer = launch(command, len(names))
     if answer is None:
         raise SystemExit(f"{problem.name}: the C host failed at a tolerance of {tolerance:g}")
@@ -123,6 +123,10 @@ def jobs_of(
     jobs: dict[str, list[Any]] = {
         "lagfmu native, from C": [
             (tol, lambda tol=tol: from_c(problem, fmu, names, read, tol)) for tol in TOLERANCES
+        ],
+        "the same by dop853": [
+            (tol, lambda tol=tol: from_c(problem, fmu, names, read, tol, "dop853"))
+            for tol in TOLERANCES
         ],
         "lagfmu native, fmpy's calls": [(tol, lambda tol=tol: in_fmpy(tol)) for tol in TOLERANCES],
     }
