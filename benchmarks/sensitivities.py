@@ -30,6 +30,7 @@ import subprocess
 import tempfile
 import time
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -199,16 +200,21 @@ def seconds(session: Session, plan: Plan, runs: int) -> float:
 
 
 COUNT = ["valgrind", "--tool=callgrind", "--callgrind-out-file=/dev/null", "--collect-atstart=no"]
-COUNTED = [f"--toggle-collect=fmi2{name}" for name in ("DoStep", "GetReal")]
+COUNTED = ("DoStep", "GetReal")
 
 
-def instructions(fmu: Path, outputs: list[str], scene: Scene) -> int:
-    """Those of the steps of three runs, and of reading the outputs after each."""
+def instructions(
+    fmu: Path, outputs: list[str], scene: Scene, counted: Sequence[str] = COUNTED
+) -> int:
+    """Those of the steps of three runs, and of reading the outputs after each; or of one of these."""
     ours = unpacked(fmu, fmu.parent)
     words = ours.command(1e-8, scene.step_size, outputs, step=scene.step_size, stop=scene.stop_time)
     words[8] = 0  # [s]: three runs
     told = subprocess.run(
-        [*COUNT, *COUNTED, *map(str, words)], check=True, capture_output=True, text=True
+        [*COUNT, *(f"--toggle-collect=fmi2{name}" for name in counted), *map(str, words)],
+        check=True,
+        capture_output=True,
+        text=True,
     )
     return int(re.search(r"Collected : (\d+)", told.stderr)[1])
 
