@@ -114,6 +114,17 @@ def test_any_joint_takes_the_rest_along(native_fmu: Fmu) -> None:
     assert {n: found[n] for n in everything} == pytest.approx(everything, rel=1e-13)
 
 
+@pytest.mark.parametrize("start", [(2.2, -7.0), (-1.9, 4.0)])
+def test_joints_that_determine_each_other_are_set_together(
+    native_fmu: Fmu, start: tuple[float, float]
+) -> None:
+    """One freedom, and all three joints are given as the triangle has them: what the first leaves of the others is
+    rounding, and is not divided by."""
+    given = slider_crank(*start)
+    found = first(native_fmu(NAME), given)
+    assert {name: found[name] for name in given} == pytest.approx(given, rel=1e-12, abs=1e-12)
+
+
 @pytest.mark.thorough
 @pytest.mark.parametrize("ride", [0.01, 0.05, 0.33])
 def test_a_wheel_on_its_road_follows(native_fmu: Fmu, ride: float) -> None:
