@@ -118,8 +118,8 @@ def test_any_joint_takes_the_rest_along(native_fmu: Fmu) -> None:
 def test_joints_that_determine_each_other_are_set_together(
     native_fmu: Fmu, start: tuple[float, float]
 ) -> None:
-    """One freedom, and all three joints are given as the triangle has them: what the first leaves of the others is
-    rounding, and is not divided by."""
+    """One freedom, and all three joints are given as the triangle has them: what the first leaves of the
+    others is rounding, and is not divided by."""
     given = slider_crank(*start)
     found = first(native_fmu(NAME), given)
     assert {name: found[name] for name in given} == pytest.approx(given, rel=1e-12, abs=1e-12)
