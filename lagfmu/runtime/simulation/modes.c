@@ -21,7 +21,7 @@ typedef struct {
     int *closed;   /* before the event, without those that depart; then the modes after it */
     int *departing; /* the multiplier passed through zero */
     int *near;     /* an impact can reach it */
-    int *struck;   /* it landed, or took an impulse */
+    int *struck;   /* it landed, or took an impulse, or others took its speed from it */
     int *touching; /* f and df/dt are zero: the accelerations decide */
     int low;       /* 1: of some that touch df/dt is not zero, but too low for them to part */
 } Flags;
@@ -58,17 +58,21 @@ static Status find_near(Solver *s, Instant at, const int *happened, Flags *x) {
 
 /* Impacts, if a contact has landed. */
 static Status strike_contacts(Solver *s, Instant at, const int *happened, Flags *x) {
-    int landed = 0;
+    int landed = 0, *arrives = x->touching; /* what touches is found after the impacts */
     const int contacts = s->system->contacts;
     double *slow = s->work_modes;
     for (int c = 0; c < contacts; c++) landed |= happened[c] && !x->departing[c];
     if (!landed) return OK;
     if (mechanism_evaluate(&s->stepped, at, s->state.q, s->state.v) != OK) return FAILED;
     find_slow(s, slow);
+    for (int c = 0; c < contacts; c++) {
+        const int k = s->system->contact[c];
+        arrives[c] = x->near[c] && !s->state.closed[c] && mechanism_slip(&s->stepped, k, s->state.v) < -slow[k];
+    }
     if (impacts(s, at, s->state.q, s->state.v, x->near, slow, x->struck) != OK) return FAILED;
     for (int c = 0; c < contacts; c++) {
         if (x->struck[c]) x->departing[c] = 0;
-        if (happened[c] && !s->state.closed[c]) x->struck[c] = 1;
+        if (arrives[c] || (happened[c] && !s->state.closed[c])) x->struck[c] = 1;
     }
     return OK;
 }
