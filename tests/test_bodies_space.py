@@ -306,6 +306,35 @@ def test_a_bead_on_a_rough_helix_rubs_with_the_norm_of_what_is_across_it():
     np.testing.assert_allclose(along[1:], -rubs[1:], rtol=1e-9)
 
 
+def test_wheels_are_put_on_the_cart_whose_place_is_given():
+    """A cart of which only the place is told stands straight, its wheels 0.3 m to either side; they were put
+    on the ground first, both in one place, and the cart was turned by 1 degree to fit."""
+    cart = Body("cart", 10.0, (0.3, 0.5, 0.6), center=(0.1, 0, 0))
+    wheels = {side: Body(side, 1.0, (0.005, 0.009, 0.005)) for side in ("left", "right")}
+    places = {"left": 0.3, "right": -0.3}
+    model = mechanism(
+        "Cart",
+        bodies=[cart, *wheels.values()],
+        joints=[
+            *(
+                Revolute(f"axle_{n}", cart.at((0, places[n], 0)), w.at((0, 0, 0)), axis="y")
+                for n, w in wheels.items()
+            ),
+            *(
+                Rolling(f"roll_{n}", ground.at((0, 0, 0)), w.at((0, 0, 0)), radius=0.15)
+                for n, w in wheels.items()
+            ),
+            PointOnPlane("caster", ground.at((0, 0, 0)), cart.at((0.5, 0, -0.15)), axis="z"),
+        ],
+        loads=[Gravity((0, 0, -g))],
+        start={"cart.position": (0.1, 0, 0.15)},
+    )
+    start = {str(q): float(x) for q, x in model.start.items()}
+    found = {n: start[f"{n}.position.y(t)"] for n in wheels}
+    assert found == pytest.approx(places, abs=1e-12)
+    assert start.get("cart.orientation.z(t)", 0.0) == pytest.approx(0.0, abs=1e-12)
+
+
 def test_a_ball_on_a_turntable_goes_round_with_two_sevenths_of_its_rate():
     """The contact moves with the table: v' = (2/7) W x v, so that the ball rolls on a circle of its own."""
     table, r = Body("table", 50.0, (10.0, 10.0, 20.0)), 0.02
