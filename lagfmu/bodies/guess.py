@@ -56,8 +56,9 @@ class Guess:
                 t for t in ties if (t.first.body in self.known) != (t.second.body in self.known)
             )
             tie = next(open_ties, None)
-            if tie is None:
-                body = next(b for b in bodies if b not in self.known)
+            placed = next((b for b in bodies if b not in self.known and self._is_given(b)), None)
+            if tie is None or (placed is not None and _leaves_place_to(placed, tie)):
+                body = placed or next(b for b in bodies if b not in self.known)
                 self.known[body] = self._put(body, self._attitude(body) or STILL)
             else:
                 self._follow(tie)
@@ -107,6 +108,10 @@ class Guess:
         origin = [self.given.get(n, x) for n, x in zip(names, pose.origin.tolist(), strict=True)]
         return Pose(pose.axes, np.array(origin), pose.angle)
 
+    def _is_given(self, body: Any) -> bool:
+        names = [f"{body.name}.position.{x}" for x in self.draft.components]
+        return all(n in self.given for n in names)
+
     def _attitude(self, body: Any) -> Pose | None:
         """The attitude of a body, if any of it is given."""
         names = [f"{body.name}.orientation.{x}" for x in "wxyz"]
@@ -128,6 +133,13 @@ class Guess:
             axes = turn(2, angle) if self.planar else np.array(rotation_of(m), dtype=float)
             poses[m] = Pose(axes, np.array([x, y, z]), angle)
         return poses
+
+
+def _leaves_place_to(body: Any, tie: Any) -> bool:
+    """Whether a tie to others says less of where things are than the place that `body` is given: it holds
+    its marker to a surface, a curve or a distance."""
+    loose = getattr(tie, "slides", "across") == "across"
+    return loose and body not in (tie.first.body, tie.second.body)
 
 
 class Reach:
