@@ -35,6 +35,7 @@ static const double BACKED = 0.4;      /* of a step that ended in one: by so muc
 static const double LOOK_AHEAD = 1e-4; /* natural times, in which it is seen how fast the angle falls */
 static const double LANDED = 1e-3;    /* angle below which a step ended in a crossing, from which none begins */
 static const double PLACED = 1e-9;   /* of a step: how well the time of a passage is found */
+static const double BESIDE = 1e-3;   /* of a step: how far beside it all rows are looked at */
 static const double NAMING = 1e-5;   /* how far off the constraints a state is taken to be that the rows are
                                       * named at: linear_rank_threshold() */
 
@@ -64,11 +65,11 @@ static double falling(Solver *s, double t, const double *y, double apart) {
 
 /* Of rows that depend on each other everywhere the angle is that of those that stand for all: others may be
  * further apart, and are then taken. */
-static int all_narrow(Solver *s, double t, const double *y) {
+static int all_narrow(Solver *s, double t, const double *y, int choose) {
     Mechanism *b = &s->stepped;
     if (mechanism_motion(b, segment_instant(s, t), y, y + s->system->nq, s->active) != OK) return 1;
     const int narrow = linear_furthest_apart(&b->linear) < NARROW;
-    segment_choose_rows(s);
+    if (choose) segment_choose_rows(s);
     return narrow;
 }
 
@@ -83,7 +84,7 @@ static void look(Solver *s, double t, const double *y) {
     *x = (Approach){t, apart, -1, 0};
     if (!(apart < NARROW)) return;
     const double fall = fabs(before) < NARROW && !dependent ? (before - apart) / h : falling(s, t, y, apart);
-    x->near = fabs(fall) > apart * s->state.now.rate && (!dependent || all_narrow(s, t, y));
+    x->near = fabs(fall) > apart * s->state.now.rate && (!dependent || all_narrow(s, t, y, 1));
     if (!x->near) return;
     x->until = apart / fall;
     if (x->until > 0) s->integrator.h_next = fmax(s->integrator.h_next, STRIDE / s->state.now.rate);
@@ -133,9 +134,16 @@ static int name_rows(Solver *s, Why *text) {
     return count;
 }
 
+/* Unless it is only the rows of the step that stand for all which depend on each other there. */
 static Status tell(Solver *s, double t) {
+    const Integrator *i = &s->integrator;
     Why rows = {""};
-    s->integrator.method->dense(&s->integrator, t, s->work_passage);
+    if (s->state.now.dependent) {
+        const double beside = t + BESIDE * (i->t - i->t_old);
+        i->method->dense(i, beside, s->work_passage);
+        if (!all_narrow(s, beside, s->work_passage, 0)) return OK;
+    }
+    i->method->dense(i, t, s->work_passage);
     if (factor_there(s, t, s->work_passage, NAMING) != OK) return FAILED;
     if (name_rows(s, &rows) == 0) return OK;
     why_append(&s->passed, "%sat t = %.9g s the motion passes, smoothly, a singular configuration: the constraints %s "
