@@ -97,6 +97,7 @@ EVERY = {  # what is tried of every FMU of models/: that its page is the native 
     "DoubleWishbone": "double_wishbone",
     "Gyroscope": "gyroscope",
     "SliderCrankBodies": "slider_crank_bodies",
+    "SliderCrankSpace": "slider_crank_space",
     "SphereInCylinder": "sphere_in_cylinder",
     "Stewart": "stewart",
 }

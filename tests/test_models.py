@@ -91,6 +91,7 @@ CHANGED = {  # far from the defaults, consistent or not: the projection and the 
     "Stewart": {"sway": 0.05, "rate": 5.0, "plate.mass": 20.0, "rod2.mass": 5.0},
     "Door": {"door.mass": 5.0, "gravity.z": -3.7, "door.inertia.zz": 2.0},
     "SliderCrankBodies": {"rod.mass": 2.5, "crank.inertia": 0.02, "gravity.y": -3.7},
+    "SliderCrankSpace": {"rod.mass": 2.5, "crank.inertia.zz": 0.02, "gravity.y": -3.7},
     "DoublePendulum": {"m1": 0.3, "m2": 2, "L1": 2, "L2": 0.5, "y1": 0.3, "der(y2)": 1.5},
     "BouncingBall": {"m": 0.3, "g": 3.7, "e": 0.4, "y": 0.5, "der(y)": 1},
     "FrictionOscillator": {"x": -0.3, "k": 40.0, "mu_k": 0.1, "mu_s": 0.1},
