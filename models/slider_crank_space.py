@@ -1,8 +1,8 @@
 """The slider-crank of slider_crank_bodies.py in space: an example of redundancy.
 
-Three parallel hinges and a slide hold each other out of the plane: of 20 rows on 18 speeds 17 are independent.
-force.A.x and .y, those of B and C, force.D.y and torque.D.z have one value, that of the mechanism in the
-plane; nothing else has.  With C spherical one redundant row is left.
+Three parallel hinges and a slide hold each other out of the plane: of 20 rows on 18 speeds 17 are
+independent.  force.A.x and .y, those of B and C, force.D.y and torque.D.z have one value, that of the
+mechanism in the plane; nothing else has.  With C spherical one redundant row is left.
 """
 
 from dataclasses import replace

@@ -478,7 +478,7 @@ def test_an_embedding_may_ride_on_a_prescribed_motion():
             Parameter(g, 9.81, "m/s^2"),
             Parameter(L, 0.7, "m"),
         ],
-        inputs=[Input(U, "m")],
+        inputs=[Input(U, "m", 0.1)],
         start={x: 0.1 + 0.7 * math.sin(0.4), y: -0.7 * math.cos(0.4)},
         embedding=Embedding(
             {phi: "rad"}, {x: U + L * sin(phi), y: -L * cos(phi)}, {phi: 0.4, phi.diff(): 0.5}

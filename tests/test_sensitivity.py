@@ -210,12 +210,12 @@ def test_options_that_do_not_go_together_are_named(native_fmu, options, told):
 
 
 def test_refused_runs_give_no_indices(native_fmu):
-    """A range in which runs end early: an index over the rest would be of another range."""
+    """A range in which spheres have no radius: an index over the rest would be of another range."""
     with pytest.raises(SimulationError, match="were refused"):
         over_ranges(
             native_fmu("Hemisphere"),
             [LEAVES],
-            {"solver.maximum_steps": (1.0, 3.0)},
+            {"a": (-1.0, 1.0)},
             samples=4,
             workers=1,
         )

@@ -278,7 +278,7 @@ def test_axes_are_crossed_in_the_order_in_which_they_are_given():
         (["--vary", "theta=1,2", "--tolerance", "1000"], "at most 0.1"),
         (["--vary", "theta=1,2", "--resume"], "the out of the sweep"),
         (["--vary", "theta=1,2", "--plot", "runs.xyz"], ".svg, .png, .pdf"),
-        (["--vary", "solver.method=1.5"], "expected a whole number"),
+        (["--vary", "solver.method=1.5"], "expected one of auto, dop853"),
     ],
 )  # fmt: skip
 def test_bad_input_is_told_with_the_remedy(hemisphere, options, message):

@@ -309,7 +309,7 @@ def test_what_nothing_holds_is_refused_with_the_best_that_was_reached():
     with pytest.raises(
         BuildError, match=r"best on the scene is radau5 \de-1\d: .*e-1\d of lambda\.rod"
     ):
-        choose(PENDULUM.model, scene, Goal(1e-12, ("lambda.rod",)), target="native")
+        choose(PENDULUM.model, scene, Goal(1e-15, ("lambda.rod",)), target="native")
 
 
 def test_an_output_that_is_not_measured_is_refused():
