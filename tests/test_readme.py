@@ -221,7 +221,8 @@ def test_the_gallery_names_every_model():
     "name",
     of_each_kind(
         sorted({*EVERY.values()}),
-        kinds={*EVERY.values()} - {"arm", "bennett", "double_wishbone", "slider_crank_space", "stewart"},
+        kinds={*EVERY.values()}
+        - {"arm", "bennett", "double_wishbone", "slider_crank_space", "stewart"},
     ),
 )
 def test_a_model_file_holds_what_is_said_and_drawn_of_it(name: str) -> None:
