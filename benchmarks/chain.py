@@ -1,13 +1,14 @@
 """How does a build grow with the model?  Chains of n links, as point masses and as bodies with hinges.
 
-    python benchmarks/chain.py [masses|bodies] [n ...]
+    python benchmarks/chain.py [masses|bodies] [n ...] [--instructions]
 
 masses: L is a sum of local terms, M and G are sparse.  bodies: a chain in space whose hinges turn about x and
 y by turns; bodies and joints are of a few kinds, instantiated and not derived anew.  It hangs, and gravity
 pulls aside.  Both should cost O(n).
 Prints for each n the processor time [s] of each stage, of masses the median of three runs, and the growth
 exponent between neighbours; of bodies also what the library does (loading, initializing, a step: the least
-of a few times), and how large it, its description and the memory of an instance are.
+of a few times), and how large it, its description and the memory of an instance are.  --instructions: of
+bodies' libraries alone, millions of instructions of an initialization and a step, as valgrind counts them.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command does, ...
 os.environ.setdefault("SYMPY_CACHE_SIZE", "50000")
 
 from fmpy import calloc
+from sensitivities import instructions
 from sympy import symbols
 from sympy.physics.mechanics import dynamicsymbols
 
@@ -41,13 +43,16 @@ from lagfmu.fmu.face import USUAL
 from lagfmu.fmu.native import sources_of
 from lagfmu.fmu.read import read_description
 from lagfmu.fmu.trial import lay_out
+from lagfmu.fmu.write import write
 from lagfmu.mechanics.form import Form
 from lagfmu.names import STEPS
 from lagfmu.prepare import prepare as steps
 from lagfmu.prepare.steps import Request
+from lagfmu.verification.simulate import simulate
 
 RUNS = 3
 TRIES = 5
+COUNTED = 3  # runs of a program whose instructions are counted
 STEP = 0.02  # s
 Stages = Iterator[str | tuple[str, float]]
 
@@ -153,6 +158,22 @@ def of_library(folder: Path, described: Any) -> Stages:
     yield "memory kB", sum(sizes) / TRIES / 1e3
 
 
+def of_instructions(n: int) -> Stages:
+    """Millions of those of initializing bodies' library, and of a step of the motion under way."""
+    model = bodies(n)
+    scene = Scene(model.name, stop_time=TRIES * STEP, step_size=STEP)
+    calls = {
+        "initialize": ["EnterInitializationMode", "ExitInitializationMode"],
+        "step": ["DoStep"],
+    }
+    with tempfile.TemporaryDirectory() as folder:
+        fmu = write(steps.prepare(model, scene), folder, target="native")
+        taken = simulate(fmu)[STEPS][-1]
+        for name, called in calls.items():
+            million = instructions(fmu, ["energy.total"], scene, called) / COUNTED / 1e6
+            yield name, million / (taken if name == "step" else 1)
+
+
 def processor() -> float:
     """Processor time [s] of this process and of those that it waited for."""
     times = os.times()
@@ -171,9 +192,11 @@ def measured(stages: Callable[[int], Stages], n: int) -> dict[str, float]:
 
 def main() -> None:
     """A line a size, and one with the growth exponents."""
-    words = sys.argv[1:] or ["masses"]
+    words = [word for word in sys.argv[1:] if not word.startswith("--")] or ["masses"]
     kind = words.pop(0) if not words[0].isdigit() else "masses"
     stages, runs = (of_masses, RUNS) if kind == "masses" else (of_bodies, 1)
+    if "--instructions" in sys.argv:
+        stages, runs = of_instructions, 1
     sizes = [int(word) for word in words] or [4, 16, 64]
     warnings.simplefilter("ignore")
     gc.set_threshold(100_000, 20, 20)  # ... like this

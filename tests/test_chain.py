@@ -158,8 +158,8 @@ def test_an_instance_of_a_long_chain_asks_for_memory_in_proportion(built, monkey
     for n in (64, 96):
         with instance(built(hinged(n, "xy"))) as one:
             one.start()
-    assert len(asked) == 2
-    assert asked[1] <= asked[0] * 1.5**1.1
+    shorter, longer = sorted({*asked})  # of each the build made an instance too
+    assert longer <= shorter * 1.5**1.1
 
 
 @pytest.mark.thorough
