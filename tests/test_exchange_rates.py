@@ -55,7 +55,11 @@ def eigenvalues(library) -> tuple[Vector, Vector, Single, list[str]]:
     return stepped, own, one, names
 
 
-@pytest.mark.parametrize("name", of_each_kind(EVERY, kinds={*KINDS, "Crane", "Belt", "Gyroscope"}))
+# off its constraints the accelerations of the redundant slider-crank contradict each other: refused, not read
+READ = [name for name in EVERY if name != "SliderCrankSpace"]
+
+
+@pytest.mark.parametrize("name", of_each_kind(READ, kinds={*KINDS, "Crane", "Belt", "Gyroscope"}))
 def test_no_stabilization_is_quicker_than_the_motion(name, library):
     """No eigenvalue of what the importer integrates lies left of -4 times the largest rate that the motion
     has by itself: its own eigenvalues, the speed at which it turns, sqrt(|acceleration|/size)."""

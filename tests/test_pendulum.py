@@ -107,18 +107,3 @@ def test_theta_determines_x_and_y(native_fmu):
                 f"'{name}' is calculated and cannot be set: set coordinates" in text
                 for text in told
             )
-
-
-@EVERY
-@pytest.mark.parametrize("tolerance", [1e-6, 1e-10])
-def test_a_swing_costs_as_much_from_its_turning_point_as_from_the_bottom(
-    native_fmu, name, tolerance
-):
-    """A quarter of a swing that begins at rest, where no speed says yet how large speeds are, takes as many
-    steps as from the bottom to the turning point, but one or two."""
-    quarter, rate = ellipk(np.sin(0.5) ** 2) / np.sqrt(9.81), 2 * np.sin(0.5) * np.sqrt(9.81)
-    falling, rising = (
-        swing(native_fmu(name), *start, stop=quarter, tolerance=tolerance, points=1)
-        for start in ((1.0, 0.0), (0.0, rate))
-    )
-    assert falling["solver.steps"][-1] <= rising["solver.steps"][-1] + 2

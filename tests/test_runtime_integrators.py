@@ -105,7 +105,7 @@ Run *run_new(int method, int problem, int ny, const double *y, double t, double 
     r->fails_after = HUGE_VAL;
     r->ode = (Ode){r, rate, jacobian, &r->why};
     for (int k = 0; k < 8; k++) r->scale[k] = 1;
-    r->control = (Control){1e-8, r->scale, 0, 0.1, 0};
+    r->control = (Control){1e-8, r->scale, 0, 0.1};
     integrator_layout(&r->i, &r->saved, &r->scratch, ny, ny, METHODS, 3);
     r->saved.base = calloc(1, r->saved.used);
     r->scratch.base = calloc(1, r->scratch.used);

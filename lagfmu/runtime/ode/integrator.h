@@ -26,7 +26,6 @@ typedef struct {
     const double *scale;   /* (watched) magnitudes below which errors are measured absolutely */
     double maximum_step;   /* [s]; 0: no limit */
     double fixed_step;     /* [s]; of rk4 and rattle */
-    double natural_time;   /* [s] in which what begins at 0 grows as large as it is going to be; 0: not known */
 } Control;
 
 typedef struct Method Method;

@@ -38,12 +38,11 @@ Status step_size_rate(Integrator *i, const Ode *ode) {
     return OK;
 }
 
-/* |x| in units of tolerance * max(|y|, scale), but of what y' makes of it in the natural time if that is more: a
- * motion from rest has no speed yet.  Root-mean-square; the largest where squares are beyond a double. */
+/* |x| in units of tolerance * max(|y|, scale), root-mean-square; the largest where squares are beyond a double. */
 static double weighted_norm(const Integrator *i, const Control *control, const double *x) {
     double tolerance = step_size_tolerance(control), sum = 0, largest = 0;
     for (int j = 0; j < i->watched; j++) {
-        double ratio = x[j] / step_size_weight(tolerance, i->y[j], i->f[j] * control->natural_time, control->scale[j]);
+        double ratio = x[j] / step_size_weight(tolerance, i->y[j], 0, control->scale[j]);
         sum += ratio * ratio;
         largest = fmax(largest, fabs(ratio));
     }

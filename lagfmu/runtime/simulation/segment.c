@@ -137,7 +137,7 @@ static Control control(const Solver *s, const Integrator *i, double longest) {
     if (set->maximum_step > 0) longest = fmin(longest, set->maximum_step);
     if (!s->integrator.method->fixed) nominals_shared(s, i->y, s->scale);
     return (Control){TOLERANCE_SHARE * segment_tolerance(s), s->scale, longest < HUGE_VAL ? longest : 0,
-                     fixed, s->state.now.rate > 0 ? 1 / s->state.now.rate : 0};
+                     fixed};
 }
 
 /* rk4 controls no error; a step whose error is as large as the state itself is refused. */
