@@ -19,7 +19,7 @@ from rich.table import Table
 from lagfmu.errors import LagfmuError
 from lagfmu.model.file import load
 from lagfmu.model.goal import Goal
-from lagfmu.study.tradeoff.choose import choose
+from lagfmu.studio.tradeoff.choose import choose
 
 GOALS = (1e-4, 1e-7, 1e-10)
 MODELS = Path(__file__).parent.parent / "models"

@@ -4,7 +4,7 @@
 
 Random parameters, starts, communication steps, tolerances and methods, native target.  Each run is held at
 every communication point against Coulomb's and Lagrange's laws as they follow from the model file alone
-(lagfmu/study/stress/lagrange.py), and against the balance of energy and heat.  Prints a table: runs, points,
+(lagfmu/studio/stress/lagrange.py), and against the balance of energy and heat.  Prints a table: runs, points,
 changes of mode, what was wrong, refusals by their cause.  A batch that does not return in ten minutes ends
 the script, named.
 """
@@ -34,8 +34,8 @@ from lagfmu.fmu.write import write
 from lagfmu.methods import FIXED_STEP, MENU
 from lagfmu.model.file import load
 from lagfmu.prepare.prepare import prepare
-from lagfmu.study.stress.closed_forms import LEEWAY, Compiled, laws
-from lagfmu.study.stress.lagrange import lagrange
+from lagfmu.studio.stress.closed_forms import LEEWAY, Compiled, laws
+from lagfmu.studio.stress.lagrange import lagrange
 
 MODELS = Path(__file__).parent.parent / "models"
 STILL = 1e-15  # a slip velocity that is none, of bodies that all have come to rest [m/s]

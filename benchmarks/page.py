@@ -15,7 +15,7 @@ sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 
 from browser import Page, chromium
 
-from lagfmu.live.command import write_page
+from lagfmu.studio.live.command import write_page
 
 MOVES = 15
 MODELS = Path(__file__).parent.parent / "models"

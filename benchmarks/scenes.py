@@ -30,8 +30,8 @@ from lagfmu.fmu.write import write
 from lagfmu.model.file import load
 from lagfmu.page.savings import NATIVE, OPERATIONS, PYTHON, Cost, cost
 from lagfmu.prepare.prepare import prepare
-from lagfmu.study.tradeoff.observe import opened, seconds
-from lagfmu.study.tradeoff.setting import Setting
+from lagfmu.studio.tradeoff.observe import opened, seconds
+from lagfmu.studio.tradeoff.setting import Setting
 
 MODELS = Path(__file__).parent.parent / "models"
 FMUS = {"PendulumCartesian": "pendulum", "Hemisphere": "hemisphere", "Chain": "chain"}

@@ -18,10 +18,10 @@ from mkdocs.structure.files import File, Files
 from PIL import Image
 
 import lagfmu
-from lagfmu.cli.film import film
-from lagfmu.live.playable import told_by
 from lagfmu.model.file import load
 from lagfmu.prepare.prepare import prepare
+from lagfmu.studio.film import film
+from lagfmu.studio.live.playable import told_by
 
 MODELS = Path(__file__).parent.parent / "models"
 MODEL = re.compile(r"\[([^\]]+)\]\((?:\.\./)+models/(\w+)\.py\)")

@@ -2,7 +2,6 @@
 
 from .api import build_fmu, show
 from .errors import LagfmuError, VerificationError
-from .live.command import play
 from .mechanics.derive import derive
 from .mechanics.equations import EquationsOfMotion
 from .mechanics.integrability.classify import classify
@@ -40,12 +39,13 @@ from .model.picture import (
 from .model.reactions import force_of_constraint, multiplier
 from .model.scene import Scene
 from .model.spline import Spline
-from .report.report import report
-from .study.fit.experiment import Experiment
-from .study.fit.result import Fit
-from .study.fit.solve import fit
-from .study.sensitivity.local import sensitivity
-from .study.sweep.sweep import sweep
+from .studio.fit.experiment import Experiment
+from .studio.fit.result import Fit
+from .studio.fit.solve import fit
+from .studio.live.command import play
+from .studio.report.report import report
+from .studio.sensitivity.local import sensitivity
+from .studio.sweep.sweep import sweep
 from .verification.check import Verification
 from .verification.result import Result
 from .verification.simulate import simulate

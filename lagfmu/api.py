@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
+from importlib.util import find_spec
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 
@@ -16,9 +18,6 @@ from .fmu.face import USUAL, Face
 from .fmu.native import try_start
 from .fmu.target import NATIVE, PYTHON
 from .fmu.write import put, write
-from .live.icon import icon
-from .live.playable import playable
-from .live.render import render
 from .model.closed_form import ClosedForm, Conserved
 from .model.file import in_scene
 from .model.goal import parse
@@ -29,11 +28,12 @@ from .page.table import printed
 from .page.text import show as show_prepared
 from .page.text import show_besides
 from .prepare.prepare import Prepared, prepare
-from .study.tradeoff.choose import Choice, Tick, choose
-from .study.tradeoff.page import section
 from .verification.check import Verification
 from .verification.crosscheck import layered
 from .verification.verify import verify
+
+if TYPE_CHECKING:
+    from .studio.tradeoff.choose import Choice, Tick
 
 
 @dataclass(frozen=True)
@@ -140,15 +140,33 @@ def package(
     found, built once, verified once, its figures put in."""
     choice, asked = None, prepared.asked
     if asked.accuracy is not None:
+        from .studio.tradeoff.choose import choose
+
         choice = choose(prepared.model, asked, parse(asked.accuracy), tick, target)
         prepared = prepare(prepared.model, choice.scene, prepared.derived)
-    told, live = section(choice) if choice else "", render(playable(prepared)) if page else ""
-    path = write(
-        prepared, out, closed_forms, target, platforms, told, live, sources, face, icon(prepared)
-    )
+    told, live, icon = _shown(prepared, choice, page)
+    path = write(prepared, out, closed_forms, target, platforms, told, live, sources, face, icon)
     runs_here = target == PYTHON or host() in chosen(platforms)
     found = verify(path) if check and runs_here else None
     more = layered(path, found) if reference and runs_here else {}
     if found is not None or more:
         put(path, more, found.rows() if found is not None else ())
     return Built(path, found, choice)
+
+
+def _shown(
+    prepared: Prepared, choice: Choice | None, page: bool
+) -> tuple[str, str, Mapping[str, bytes]]:
+    """What the studio puts into an FMU: how its tolerance was chosen, its live page, its icon.
+
+    Without the studio's folder an FMU has none of them, and is right all the same.
+    """
+    if find_spec(".studio", __package__) is None:
+        return "", "", {}
+    from .studio.live.icon import icon
+    from .studio.live.playable import playable
+    from .studio.live.render import render
+    from .studio.tradeoff.page import section
+
+    told = section(choice) if choice else ""
+    return told, render(playable(prepared)) if page else "", icon(prepared)

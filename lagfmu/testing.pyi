@@ -1,7 +1,6 @@
 """The names of testing.py, and where they are."""
 
 from .bodies.solid import solid
-from .cli import film
 from .cli import stress as stress_command
 from .cli.app import COMMANDS, app
 from .cli.progress import told
@@ -38,11 +37,6 @@ from .fmu.target import NoCompilerWarning
 from .fmu.terminals import terminals
 from .fmu.write import as_built, write
 from .interface.rules import problems_of
-from .live import moving, solids, view, wasm
-from .live.icon import icon
-from .live.moving import Moving
-from .live.playable import playable, told_by
-from .live.render import Playable, render
 from .mechanics import simplification
 from .mechanics.form import Form
 from .mechanics.formulations.minimal import reduce
@@ -96,19 +90,25 @@ from .page.wrapped import wrapped
 from .prepare.consistency import RedundantConstraintWarning
 from .prepare.prepare import Prepared, prepare
 from .prepare.starts import StartMovedWarning
-from .report import pdf as report_pdf
-from .study.fit import solve as fit_solve
-from .study.sensitivity.local import sensitivity
-from .study.sensitivity.ranges import over_ranges
-from .study.stress import runs, worker
-from .study.stress.bench import Bench, Finding
-from .study.stress.closed_forms import judged, magnitude
-from .study.stress.facts import facts_of
-from .study.stress.judge import Check, sizes_of
-from .study.stress.lagrange import lagrange, lay_beside
-from .study.stress.player import Run, clear
-from .study.stress.player import opened as session_of
-from .study.stress.probe import (
+from .studio import film
+from .studio.fit import solve as fit_solve
+from .studio.live import moving, solids, view, wasm
+from .studio.live.icon import icon
+from .studio.live.moving import Moving
+from .studio.live.playable import playable, told_by
+from .studio.live.render import Playable, render
+from .studio.report import pdf as report_pdf
+from .studio.sensitivity.local import sensitivity
+from .studio.sensitivity.ranges import over_ranges
+from .studio.stress import runs, worker
+from .studio.stress.bench import Bench, Finding
+from .studio.stress.closed_forms import judged, magnitude
+from .studio.stress.facts import facts_of
+from .studio.stress.judge import Check, sizes_of
+from .studio.stress.lagrange import lagrange, lay_beside
+from .studio.stress.player import Run, clear
+from .studio.stress.player import opened as session_of
+from .studio.stress.probe import (
     CONSISTENT,
     REFUSED,
     RIGHT,
@@ -119,23 +119,23 @@ from .study.stress.probe import (
     attempt,
     verdict,
 )
-from .study.stress.probes import probes
-from .study.stress.report import NO_WORRY, VERDICTS, WORRY, Stressed
-from .study.stress.runs import departures, started
-from .study.sweep import engine
-from .study.sweep.design import axis, design, distribution, sampled
-from .study.sweep.parts import PartWarning
-from .study.sweep.process import SessionProcess
-from .study.sweep.table import happened
-from .study.tradeoff.choose import choose
-from .study.tradeoff.held_out import other_values
-from .study.tradeoff.measure import Plan as TradeoffPlan
-from .study.tradeoff.measure import Point, Tradeoff, measure
-from .study.tradeoff.observe import observe, opened
-from .study.tradeoff.quantities import OWN, quantities
-from .study.tradeoff.reference import refer
-from .study.tradeoff.report import table as tradeoff_table
-from .study.tradeoff.setting import Setting
+from .studio.stress.probes import probes
+from .studio.stress.report import NO_WORRY, VERDICTS, WORRY, Stressed
+from .studio.stress.runs import departures, started
+from .studio.sweep import engine
+from .studio.sweep.design import axis, design, distribution, sampled
+from .studio.sweep.parts import PartWarning
+from .studio.sweep.process import SessionProcess
+from .studio.sweep.table import happened
+from .studio.tradeoff.choose import choose
+from .studio.tradeoff.held_out import other_values
+from .studio.tradeoff.measure import Plan as TradeoffPlan
+from .studio.tradeoff.measure import Point, Tradeoff, measure
+from .studio.tradeoff.observe import observe, opened
+from .studio.tradeoff.quantities import OWN, quantities
+from .studio.tradeoff.reference import refer
+from .studio.tradeoff.report import table as tradeoff_table
+from .studio.tradeoff.setting import Setting
 from .verification.closed_forms import applies, check_closed_form, landed
 from .verification.evaluate import Compiled
 from .verification.exit_codes import EXIT_CODES, NOT_RUN, TERMINATED, WRONG_USAGE

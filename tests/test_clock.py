@@ -15,10 +15,9 @@ import lagfmu
 from lagfmu import classify
 
 HOUSE = Path(lagfmu.__file__).parent
-TIMED = ("study", "cli", "verification", "api.py", "page")  # they report what a run has cost
+TIMED = ("studio", "cli", "verification", "api.py", "page")  # they report what a run has cost
 RUNS = ("fmu/session.py",)  # they measure it
 A_LOGGER_A_THREAD = ("fmu/binary.py",)
-A_BROWSER_TO_START = ("report/firefox.py",)
 CLOCKS = {"time", "timeit", "signal", "threading", "resource"}
 
 
@@ -39,7 +38,7 @@ def test_only_what_reports_reads_a_clock():
         for p in HOUSE.rglob("*.py")
         if p.relative_to(HOUSE).parts[0] not in TIMED and imports(p) & CLOCKS
     }
-    assert timed == {*RUNS, *A_LOGGER_A_THREAD, *A_BROWSER_TO_START}
+    assert timed == {*RUNS, *A_LOGGER_A_THREAD}
 
 
 def test_a_search_without_an_end_is_given_up_by_what_it_has_done(monkeypatch):

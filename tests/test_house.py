@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import ast
+import os
 import re
 import runpy
+import shutil
+import subprocess
+import sys
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -28,16 +32,15 @@ ROOMS = (  # each imports from those before it, and from no other
     "prepare",
     "page",
     "fmu",
-    "live",
     "verification",
-    "study",
-    "report",
+    "studio",
     "api",
     "cli",
     "testing",
 )
 FLOORS = ("base", "linear", "ode", "mechanics", "simulation", "fmi")  # of the C runtime
 HOUSE = runpy.run_path(str(ROOT.parent / "benchmarks" / "house.py"))
+CORE = ROOMS[: ROOMS.index("studio")]
 MODULES = sorted(p for p in ROOT.rglob("*.py") if p.parent != ROOT or p.stem in ROOMS)
 
 
@@ -70,6 +73,30 @@ def test_imports_run_in_one_direction(path: Path) -> None:
     own = ROOMS.index(room(path))
     above = {name for name in imported(path) if ROOMS.index(name) > own}
     assert not above
+
+
+def test_the_core_knows_no_studio(tmp_path: Path) -> None:
+    """What makes an FMU that is right works without the folder of what makes many runs of it: a model is
+    built and verified there."""
+    assert not [p for p in MODULES if room(p) in CORE and "studio" in imported(p)]
+    copy = shutil.copytree(
+        ROOT, tmp_path / "lagfmu", ignore=shutil.ignore_patterns("studio", "__pycache__")
+    )
+    model, where = (
+        ROOT.parent / "models" / "hemisphere.py",
+        {**os.environ, "PYTHONPATH": str(tmp_path)},
+    )
+    for words in (["build", str(model)], ["verify", "dist/native/Hemisphere.fmu"]):
+        done = subprocess.run(
+            [sys.executable, "-m", "lagfmu", *words],
+            cwd=tmp_path,
+            env=where,
+            capture_output=True,
+            text=True,
+        )
+        assert done.returncode == 0, done.stdout + done.stderr
+        assert "pass" in done.stdout
+    assert not (copy / "studio").exists()
 
 
 def test_no_module_is_imported_in_secret() -> None:

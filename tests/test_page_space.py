@@ -185,7 +185,7 @@ def test_what_is_lost_is_drawn_flat(opened: Opened) -> None:
 
 def test_of_three_js_is_there_what_is_used() -> None:
     """The library is made of the names that the page's scripts mention, of no more and no fewer."""
-    web = files("lagfmu").joinpath("live", "web")
+    web = files("lagfmu").joinpath("studio", "live", "web")
     scripts = (
         web.joinpath(f"{name}.js").read_text(encoding="utf-8") for name in ("meshes", "space")
     )

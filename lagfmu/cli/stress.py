@@ -21,17 +21,17 @@ from ..fmu.write import write
 from ..model.file import ModelFile
 from ..model.scene import Scene
 from ..prepare.prepare import prepare
-from ..study.host import DiedError, Host, LateError
-from ..study.stress.facts import facts_of
-from ..study.stress.lagrange import lay_beside
-from ..study.stress.probe import UNFINISHED, WRONG, Probe, Verdict
-from ..study.stress.probes import probes
-from ..study.stress.report import MEANING, Stressed, report, summary, table
+from ..studio.host import DiedError, Host, LateError
+from ..studio.stress.facts import facts_of
+from ..studio.stress.lagrange import lay_beside
+from ..studio.stress.probe import UNFINISHED, WRONG, Probe, Verdict
+from ..studio.stress.probes import probes
+from ..studio.stress.report import MEANING, Stressed, report, summary, table
 from ..verification.junit import Report
 from .progress import progress
 from .works import studied
 
-WORKER = "lagfmu.study.stress.worker"
+WORKER = "lagfmu.studio.stress.worker"
 START = 120.0  # [s] for the process to begin with the first one
 WIDTH = 110  # of tables that go into a file
 

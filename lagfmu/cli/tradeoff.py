@@ -19,10 +19,10 @@ from ..model.scene import Scene
 from ..numeric.tolerance import tolerance_problem
 from ..page.table import print_whole
 from ..prepare.prepare import prepare
-from ..study.tradeoff.choose import Choice
-from ..study.tradeoff.figure import draw
-from ..study.tradeoff.measure import DECADES, Plan, Tradeoff, measure
-from ..study.tradeoff.report import remarks, report, table
+from ..studio.tradeoff.choose import Choice
+from ..studio.tradeoff.figure import draw
+from ..studio.tradeoff.measure import DECADES, Plan, Tradeoff, measure
+from ..studio.tradeoff.report import remarks, report, table
 from ..verification.junit import Report
 from .progress import progress
 from .terminal import say, say_wrote

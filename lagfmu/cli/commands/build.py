@@ -95,7 +95,6 @@ def build(
     from ..finish import print_verdicts
     from ..progress import progress
     from ..scenes import loaded, narrowed
-    from ..tradeoff import say_chosen
 
     failed = False
     places = tuple(n for text in platforms or [HOST] for n in text.replace(",", " ").split())
@@ -133,6 +132,8 @@ def build(
                 )
             path, found = built.path, built.verification
             if built.choice is not None:
+                from ..tradeoff import say_chosen
+
                 say_chosen(built.choice, console)
             say_wrote(path, kilobytes(path), "built")
             if found is not None:

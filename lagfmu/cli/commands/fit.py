@@ -58,9 +58,9 @@ def fit(
     from ...fmu.read import read_description, units_of
     from ...fmu.write import as_fmu, write_whole
     from ...page.table import print_whole
-    from ...study.fit.problem import bounds_of, derivatives_of, deviation_of, named
-    from ...study.fit.solve import TOLERANCE
-    from ...study.fit.solve import fit as found_by
+    from ...studio.fit.problem import bounds_of, derivatives_of, deviation_of, named
+    from ...studio.fit.solve import TOLERANCE
+    from ...studio.fit.solve import fit as found_by
     from ...verification.exit_codes import FAILS
     from ...verification.junit import text_of
 

@@ -30,7 +30,7 @@ def page(
     add_output: AddOutput = None,
 ) -> None:
     """Write one HTML file in which the FMU runs: offline, with sliders, curves and the mechanism."""
-    from ...live.command import write_page
+    from ...studio.live.command import write_page
     from ..scenes import for_models, loaded, narrowed
 
     with plainly():

@@ -33,8 +33,8 @@ def report(
     """Write what an FMU does as one file: the mechanism, equations, curves with events, forces with their
     extremes, verification, accuracy, versions."""
     from ...fmu.read import read_description, units_of
-    from ...report.report import STUDIES
-    from ...report.report import report as written
+    from ...studio.report.report import STUDIES
+    from ...studio.report.report import report as written
     from ...verification.reference import Reference, read_table
 
     with plainly(), console.status(f"reporting on {source}"):

@@ -58,9 +58,9 @@ def sensitivity(
     from ...fmu.write import write_whole
     from ...model.selection import listed
     from ...page.table import print_whole
-    from ...study.sensitivity.local import ALL, TOLERANCE, made_for
-    from ...study.sensitivity.local import sensitivity as found_by
-    from ...study.sensitivity.ranges import over_ranges
+    from ...studio.sensitivity.local import ALL, TOLERANCE, made_for
+    from ...studio.sensitivity.local import sensitivity as found_by
+    from ...studio.sensitivity.ranges import over_ranges
     from ...verification.junit import text_of
 
     outputs = [n for text in of for n in listed(text)]

@@ -46,10 +46,8 @@ def simulate(
     others.
     """
     from ...fmu.read import read_description, units_of
-    from ...live.playable import told_by
     from ...prepare.prepare import prepare
     from ...verification.simulate import simulate as simulated
-    from ..film import film
     from ..scenes import for_models, loaded, narrowed
 
     with plainly():
@@ -86,6 +84,9 @@ def simulate(
         if plot_ is not None:
             say_wrote(result.plot(*(variable or ()), out=plot_))
         if animate is not None:
+            from ...studio.film import film
+            from ...studio.live.playable import told_by
+
             with console.status(f"drawing {name}"):
                 film(told_by(run), result, given, animate, name)
             say_wrote(animate)

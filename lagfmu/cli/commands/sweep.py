@@ -78,9 +78,9 @@ def sweep(
     figure: Plot = None,
 ) -> None:
     """Run an FMU many times: parameters and start values crossed, sampled, or from a file."""
-    from ...study.sweep.design import axis, distribution, from_file
-    from ...study.sweep.plot import FIGURES, plot
-    from ...study.sweep.sweep import sweep as run
+    from ...studio.sweep.design import axis, distribution, from_file
+    from ...studio.sweep.plot import FIGURES, plot
+    from ...studio.sweep.sweep import sweep as run
     from ..progress import told
     from ..swept import print_sweep
 

@@ -47,7 +47,6 @@ def verify(
     The exit code is the largest of all FMUs'.
     """
     from ...fmu.write import write_whole
-    from ...report.report import verified
     from ...verification.junit import refused
     from ...verification.reference import Reference, read_table
     from ...verification.report import report
@@ -81,6 +80,8 @@ def verify(
                     say(str(fmu))
                 print_verdicts(found)
         if html is not None:
+            from ...studio.report.report import verified
+
             page = verified([(r.file, r.found, r.error) for r in done])
             write_whole(html, page.encode())
             say_wrote(html)

@@ -7,17 +7,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..errors import BuildError
-from ..fmu.archive import opened
-from ..fmu.bundle import unbundled
-from ..fmu.native import GENERATED, IDENTITY, sources_of
-from ..fmu.read import read_description
-from ..fmu.write import PAGE
-from ..page import preset as presets
-from ..page.documentation import mathml
-from ..page.picture import IN_FMU, picture_of, read_picture
-from ..page.typeset import typeset
-from ..prepare.prepare import Prepared
+from ...errors import BuildError
+from ...fmu.archive import opened
+from ...fmu.bundle import unbundled
+from ...fmu.native import GENERATED, IDENTITY, sources_of
+from ...fmu.read import read_description
+from ...fmu.write import PAGE
+from ...page import preset as presets
+from ...page.documentation import mathml
+from ...page.picture import IN_FMU, picture_of, read_picture
+from ...page.typeset import typeset
+from ...prepare.prepare import Prepared
 from .facts import facts
 from .markup import Section, equations_of, safe_mathml
 from .render import Playable

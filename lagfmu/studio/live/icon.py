@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from ..fmu.terminals import ICON
-from ..numeric.instant import at_start, expanded
-from ..page.picture import names_in, picture_of
-from ..prepare.consistency import posed
-from ..prepare.prepare import Prepared
+from ...fmu.terminals import ICON
+from ...numeric.instant import at_start, expanded
+from ...page.picture import names_in, picture_of
+from ...prepare.consistency import posed
+from ...prepare.prepare import Prepared
 from .moving import Moving, in_order
 from .view import View
 

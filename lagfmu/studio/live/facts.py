@@ -11,13 +11,13 @@ from typing import Any
 
 import fmpy
 
-from .. import names
-from ..fmu.archive import pack
-from ..fmu.read import described_rules, experiment_of, kind_of
-from ..model.rule import MESSAGES, Rule
-from ..model.units import for_reading
-from ..page.groups import heading
-from ..page.preset import SETTABLE
+from ... import names
+from ...fmu.archive import pack
+from ...fmu.read import described_rules, experiment_of, kind_of
+from ...model.rule import MESSAGES, Rule
+from ...model.units import for_reading
+from ...page.groups import heading
+from ...page.preset import SETTABLE
 
 # of a variable; `reference`: its place.  What is seldom usual comes first
 USUAL: dict[str, Any] = {

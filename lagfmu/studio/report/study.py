@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 from markupsafe import Markup
 
-from ..study.sweep.plot import figure_of
-from ..study.sweep.table import happened, numbers, one_by_one, read_rows, varied
-from ..verification.result import as_text
+from ...verification.result import as_text
+from ..sweep.plot import figure_of
+from ..sweep.table import happened, numbers, one_by_one, read_rows, varied
 from .figures import svg
 
 

@@ -9,11 +9,11 @@ from typing import Any
 
 from markupsafe import Markup
 
-from .. import names
+from ... import names
+from ...verification.check import Check
+from ...verification.plot import COLOURS, figure_of
 from ..live.facts import facts
 from ..live.stage import sketch
-from ..verification.check import Check
-from ..verification.plot import COLOURS, figure_of
 from .findings import Findings
 from .tables import forces
 
@@ -75,7 +75,7 @@ def misses(checks: Sequence[Check]) -> list[tuple[str, Markup]]:
     import matplotlib as mpl
     from matplotlib.figure import Figure
 
-    from ..verification.figure import STYLE
+    from ...verification.figure import STYLE
 
     drawn = []
     for k, check in enumerate(checks):

@@ -14,17 +14,17 @@ from typing import Any
 
 import numpy as np
 
-from .. import names
-from ..errors import VerificationError
-from ..fmu.archive import tool
-from ..fmu.read import experiment_of, read_description
+from ... import names
+from ...errors import VerificationError
+from ...fmu.archive import tool
+from ...fmu.read import experiment_of, read_description
+from ...verification.check import Verification
+from ...verification.evaluate import alone
+from ...verification.reference import Driven, Reference
+from ...verification.result import Result
+from ...verification.simulate import simulate
+from ...verification.verify import verify
 from ..live.playable import Told, told_by
-from ..verification.check import Verification
-from ..verification.evaluate import alone
-from ..verification.reference import Driven, Reference
-from ..verification.result import Result
-from ..verification.simulate import simulate
-from ..verification.verify import verify
 
 CLOSER = 1e-2  # of the tolerance: the run that this one is compared with
 CLOSEST = 1e-13

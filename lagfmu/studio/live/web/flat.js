@@ -215,7 +215,7 @@ function lowest(s, look) {
   return slack > 0 ? hanging(a, b, Math.sqrt(slack) / 2).slice(HANGING / 2, HANGING / 2 + 1) : [];
 }
 
-/* A string that is longer than the way between its ends hangs, and keeps its length (so in cli/film.py). */
+/* A string that is longer than the way between its ends hangs, and keeps its length (so in studio/film.py). */
 function linePoints(s, look) {
   const ends = s.points.map((p) => p(look));
   if (!s.length) return ends;

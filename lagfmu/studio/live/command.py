@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
 
-from ..fmu.write import write_whole
-from ..model.file import fmu_at, in_scene
-from ..model.model import Model
-from ..model.scene import Scene
-from ..prepare.prepare import prepare
-from ..prepare.starts import check_given, tell
+from ...fmu.write import write_whole
+from ...model.file import fmu_at, in_scene
+from ...model.model import Model
+from ...model.scene import Scene
+from ...prepare.prepare import prepare
+from ...prepare.starts import check_given, tell
 from .playable import playable
 from .render import Playable, render
 

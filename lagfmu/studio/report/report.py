@@ -7,13 +7,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..errors import UsageError
-from ..fmu.write import as_fmu, write_whole
-from ..model.model import Model
-from ..model.scene import Scene
-from ..page.template import template
-from ..verification.check import Verification
-from ..verification.reference import Driven, Reference
+from ...errors import UsageError
+from ...fmu.write import as_fmu, write_whole
+from ...model.model import Model
+from ...model.scene import Scene
+from ...page.template import template
+from ...verification.check import Verification
+from ...verification.reference import Driven, Reference
 from . import figures, tables
 from .findings import Findings, findings
 from .pdf import printed
@@ -75,10 +75,10 @@ def rendered(found: Findings | None, study: Study | None) -> str:
     about: dict[str, Any] = {"study": study}
     if found is None:
         assert study is not None
-        return template("report/study.html.j2").render(name=study.name, **about)
+        return template("studio/report/study.html.j2").render(name=study.name, **about)
     rows, continuous = tables.extremes(found)
     checks = () if found.verification is None else found.verification.checks
-    return template("report/report.html.j2").render(
+    return template("studio/report/report.html.j2").render(
         name=found.description.modelName,
         described=found.description.description or "",
         found=found,
@@ -102,4 +102,4 @@ def verified(results: Sequence[tuple[str, Verification | None, str]]) -> str:
         (file, found, why, figures.misses(found.checks) if found else [])
         for file, found, why in results
     ]
-    return template("report/verified.html.j2").render(results=told)
+    return template("studio/report/verified.html.j2").render(results=told)

@@ -25,7 +25,7 @@ class SessionProcess(Host):
     after a run that took longer than `limit` [s]."""
 
     def __init__(self, folder: str | Path, limit: float | None = None) -> None:
-        super().__init__("lagfmu.study.sweep.process", str(folder))
+        super().__init__("lagfmu.studio.sweep.process", str(folder))
         self.folder, self.limit = folder, limit
         self.pace = np.inf  # [s] that a run took
 

@@ -18,7 +18,7 @@ from typing import Any
 
 from markupsafe import Markup
 
-from ..page.template import template
+from ...page.template import template
 from .facts import lean
 from .markup import Section, as_json
 
@@ -77,7 +77,7 @@ def render(playable: Playable) -> str:
         library = _script(f"/* three.js\n{_text('vendor', SPACE_LICENCE)}*/\n{library}")
         scripts = [library, application, _text("vendor", SPACE)]
         style += _lean(_text("space.css"))
-    return template("live/web/page.html.j2").render(
+    return template("studio/live/web/page.html.j2").render(
         name=playable.name,
         description=playable.facts["description"],
         equations=playable.equations,
@@ -121,4 +121,4 @@ def _hash(text: str) -> str:
 
 @cache
 def _text(*parts: str) -> str:
-    return files("lagfmu").joinpath("live", "web", *parts).read_text(encoding="utf-8")
+    return files("lagfmu").joinpath("studio", "live", "web", *parts).read_text(encoding="utf-8")

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from .. import names
-from ..fmu.read import kind_of
-from ..model.units import for_reading
-from ..verification.plot import SAID, moments
-from ..verification.result import Result, as_text
+from ... import names
+from ...fmu.read import kind_of
+from ...model.units import for_reading
+from ...verification.plot import SAID, moments
+from ...verification.result import Result, as_text
 from .findings import Findings, obtained
 
 JOINTS = ("force", "torque")  # first words of outputs that are a joint's wrench

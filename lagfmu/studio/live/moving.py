@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..page.packed import values
+from ...page.packed import values
 from .solids import SQUARE, ball, box, cylinder
 
 AZIMUTH, ELEVATION = -1.05, 0.42  # rad, from which a picture in space is seen, as on the page

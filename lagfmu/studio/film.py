@@ -16,11 +16,11 @@ import numpy as np
 from ..errors import BuildError, UsageError
 from ..fmu.read import Trajectory
 from ..fmu.write import write_whole
-from ..live.playable import Told
-from ..live.recording import recorded
-from ..live.render import render
-from ..live.stage import Stage
-from ..live.view import FORCE, INK, View
+from .live.playable import Told
+from .live.recording import recorded
+from .live.render import render
+from .live.stage import Stage
+from .live.view import FORCE, INK, View
 
 RATE, MOST = 25, 300  # frames per second, and of a film
 ENDINGS = (".gif", ".mp4", ".html", ".webp")

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from importlib.resources import files
 
-from ..errors import BuildError
-from ..fmu.compiler import WASM, compile_libraries, find_compiler
-from ..fmu.native import ALL, GENERATED
+from ...errors import BuildError
+from ...fmu.compiler import WASM, compile_libraries, find_compiler
+from ...fmu.native import ALL, GENERATED
 
 IMPORTER = "importer.c"
 
@@ -27,5 +27,5 @@ def compile_module(name: str, sources: Mapping[str, bytes]) -> bytes:
         )
     own = {file: text for file, text in sources.items() if file in GENERATED}
     runtime = {file: text for file, text in sources.items() if file not in own and file != ALL}
-    own[IMPORTER] = files("lagfmu").joinpath("live/web", IMPORTER).read_bytes()
+    own[IMPORTER] = files("lagfmu").joinpath("studio/live/web", IMPORTER).read_bytes()
     return compile_libraries(name, own, runtime, [WASM])[WASM.folder]
