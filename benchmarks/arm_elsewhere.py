@@ -23,7 +23,7 @@ from lagfmu.bodies import Gravity, from_urdf, mechanism
 from lagfmu.model.file import load
 from lagfmu.names import derivative
 
-sys.path.insert(0, str(Path(__file__).parent / "independent"))
+sys.path.insert(0, str(Path(__file__).parent.parent / "tests" / "independent"))
 from linkage import least
 
 ARM = Path(__file__).parent.parent / "models" / "arm.py"

@@ -2,7 +2,7 @@
 
     python benchmarks/error_bars.py [--runs 40] [--seed 1] [--quick] [--drawn 40] [--misses 10] [SCENE ...]
 
-Every scene of models/ and benchmarks/unseen/ is built with error bars, and runs are drawn: parameters and
+Every scene of models/ and tests/unseen/ is built with error bars, and runs are drawn: parameters and
 start values up to 20 % off, tolerances from 1e-4 to 1e-11, communication steps from a third of the scene's
 to twenty times it, inputs that swing, every fourth batch four times as long.  The true error of every
 quantity at every communication point is taken against the same run at a tolerance of 1e-13, less what that
@@ -45,7 +45,7 @@ from lagfmu.names import bar as bar_of
 from lagfmu.prepare.prepare import prepare
 
 HERE = Path(__file__).parent
-FOLDERS = (HERE.parent / "models", HERE / "unseen")
+FOLDERS = (HERE.parent / "models", HERE.parent / "tests" / "unseen")
 OFF, LONG, EVERY, TOGETHER = 0.2, 4, 4, 5
 TOLERANCES, STEPS = (-11.0, -4.0), (-0.5, 1.3)  # powers of ten; of the scene's communication step
 MOST_POINTS = 300

@@ -1,8 +1,9 @@
 """Closed loops of links in the plane on pins, and the forces in the pins that close them: for others.py.
 
-A02 and A03 of the IFToMM library (independent/iftomm.py): the N-four-bar mechanism with two windows, which
-passes configurations in which its rows lose rank and its forces grow without bound, and Andrews' squeezer.
-The references are those of independent/: a closed form, and Newton's and Euler's equations by hand.
+A02 and A03 of the IFToMM library (tests/independent/iftomm.py): the N-four-bar mechanism with two windows,
+which passes configurations in which its rows lose rank and its forces grow without bound, and Andrews'
+squeezer.
+The references are those of tests/independent/: a closed form, and Newton's and Euler's equations by hand.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parent / "independent"))
+sys.path.insert(0, str(Path(__file__).parent.parent / "tests" / "independent"))
 import andrews
 import iftomm
 from plane import GROUND, Mechanism, Pin

@@ -23,7 +23,7 @@ import numpy as np
 from lagfmu import Scene, build_fmu
 from lagfmu.fmu.session import Session
 
-sys.path.insert(0, str(Path(__file__).parent / "independent"))
+sys.path.insert(0, str(Path(__file__).parent.parent / "tests" / "independent"))
 from joints import across
 from linkage import Linkage, Tie
 from mechanisms import bennett, door, four_bar

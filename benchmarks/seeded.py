@@ -38,7 +38,7 @@ LONGER = 1.5
 LONGEST = 3.0  # s of a scene that are run
 NATIVE, PYTHON = "native", "python"
 CONTACT, STEPS = "contact", "solver.steps"  # outputs
-COPIED = ("lagfmu", "models", "benchmarks/unseen")
+COPIED = ("lagfmu", "models", "tests/unseen")
 
 
 def simulated(folder: Path, spec: str, target: str) -> np.ndarray | str:

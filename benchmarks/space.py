@@ -1,8 +1,9 @@
 """Mechanisms in space as data, and what their joints and springs do to each body: for others.py.
 
-A04 and A05 of the IFToMM library (independent/iftomm.py): Bricard's mechanism, whose six hinges hold each
-other (no force of one alone is determined), and the stiff flyball governor.  Asked is m (a + g) of each body,
-the sum of all that joints and springs do to it; the references are those of independent/: Newton's and
+A04 and A05 of the IFToMM library (tests/independent/iftomm.py): Bricard's mechanism, whose six hinges hold
+each other (no force of one alone is determined), and the stiff flyball governor.  Asked is m (a + g)
+of each body, the sum of all that joints and springs do to it; the references
+are those of tests/independent/: Newton's and
 Euler's equations by hand, and Lagrange's in three coordinates.
 """
 
@@ -18,7 +19,7 @@ from typing import Any
 import numpy as np
 from loops import samples
 
-sys.path.insert(0, str(Path(__file__).parent / "independent"))
+sys.path.insert(0, str(Path(__file__).parent.parent / "tests" / "independent"))
 import iftomm
 from linkage import Linkage, Spring, Tie
 from rigid import Mass

@@ -130,9 +130,9 @@ def as_small_as_can_be() -> Iterator[None]:
 
 @cache
 def model_file(name: str) -> ModelFile:
-    """A file of models/, or of benchmarks/, loaded once."""
+    """A file of models/, or beside this one, loaded once."""
     path = MODELS / f"{name}.py"
-    return load(path if path.exists() else MODELS.parent / "benchmarks" / path.name)
+    return load(path if path.exists() else Path(__file__).parent / path.name)
 
 
 def scene_of(name: str) -> tuple[ModelFile, Scene]:

@@ -16,14 +16,14 @@ from lagfmu import Scene
 from lagfmu.testing import find_compiler, load
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
-UNSEEN = Path(__file__).parent.parent / "benchmarks" / "unseen"
+UNSEEN = Path(__file__).parent / "unseen"
 HEAD = 80  # bytes before the record: magic, layout, byte order, size, checksum, GUID
 EXTREME = (1e300, -1e300, 1e308, -1e308, 1e150, -1e150, 1e-300, 1e100, 1.0, 0.0, 5e-324, -1e20)
 
 
 @pytest.fixture
 def rough(built: Callable[..., Path], library: Callable[..., Library]) -> Callable[..., Library]:
-    """rough(NAME): the native FMU of benchmarks/unseen/NAME.py, of friction and forces from outside."""
+    """rough(NAME): the native FMU of unseen/NAME.py, of friction and forces from outside."""
 
     def get(name: str, error_bars: bool = False) -> Library:
         model = load(UNSEEN / f"{name}.py").model

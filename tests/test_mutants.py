@@ -27,7 +27,7 @@ def test_what_is_aimed_at_a_defect_exists() -> None:
     for model in {d.stress for d in DEFECTS} - {""}:
         assert (ROOT / "models" / f"{model}.py").exists(), model
     for model, scene, *_ in {tuple(d.engines.split("/")) for d in DEFECTS if d.engines}:
-        places = (ROOT / "models", ROOT / "benchmarks" / "unseen")
+        places = (ROOT / "models", ROOT / "tests" / "unseen")
         text = "".join(
             (p / f"{model}.py").read_text() for p in places if (p / f"{model}.py").exists()
         )

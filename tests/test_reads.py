@@ -1,5 +1,5 @@
 """What is read after a force was set and before the next step: the values with which that step begins, by
-the laws of contact and friction (`benchmarks/unseen/`); a look, which leaves no trace."""
+the laws of contact and friction (`unseen/`); a look, which leaves no trace."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from lagfmu import Contact, Holonomic, Input, Model, Parameter, Scene
 from lagfmu.testing import find_compiler, load
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
-UNSEEN = Path(__file__).parent.parent / "benchmarks" / "unseen"
+UNSEEN = Path(__file__).parent / "unseen"
 G = 9.81
 Built = Callable[[str], Path]
 
@@ -64,7 +64,7 @@ def tied() -> Model:
 
 
 def model_of(name: str) -> Model:
-    """Of benchmarks/unseen/, or of this file."""
+    """Of unseen/, or of this file."""
     own: dict[str, Callable[[], Model]] = {"box": box, "tied": tied}
     return own[name]() if name in own else load(UNSEEN / f"{name}.py").model
 

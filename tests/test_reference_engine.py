@@ -25,7 +25,7 @@ from lagfmu import (
 from lagfmu.errors import BuildError
 from lagfmu.testing import load, prepare, write
 
-UNSEEN = Path(__file__).parent.parent / "benchmarks" / "unseen"
+UNSEEN = Path(__file__).parent / "unseen"
 t = dynamicsymbols._t
 x, z, theta = dynamicsymbols("x z theta")
 m, g, L, w, F = symbols("m g L w F", positive=True)

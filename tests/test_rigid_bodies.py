@@ -1,4 +1,4 @@
-"""Bodies and joints against Newton's and Euler's equations written by hand (benchmarks/independent)."""
+"""Bodies and joints against Newton's and Euler's equations written by hand (independent/)."""
 
 from __future__ import annotations
 

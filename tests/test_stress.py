@@ -56,7 +56,7 @@ from lagfmu.testing import (
 from lagfmu.testing import judged as judged_forms
 from lagfmu.testing import stress_command as command
 
-UNSEEN = Path(__file__).parent.parent / "benchmarks" / "unseen"
+UNSEEN = Path(__file__).parent / "unseen"
 
 
 @pytest.fixture(scope="module")

@@ -1,6 +1,6 @@
 """Twenty-nine systems against integrations written by hand, in co-simulation and in model exchange.
 
-    python benchmarks/independent/compare.py [NAME ...]
+    python tests/independent/compare.py [NAME ...]
 
 A row a system: the largest error at its end of all that is known there, relative to the variable's size (of
 a force's component: to the largest), in co-simulation at 1e-6 and 1e-10, in model exchange with fmpy's CVODE
