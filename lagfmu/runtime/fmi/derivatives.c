@@ -98,7 +98,7 @@ static double remembered(Instance *x, const Variable *of, int c) {
     const double *column = column_at(&x->solver, c);
     if (of->place == AT_IMPULSE) return column[column_of_impulse(system, of->index)];
     if (of->place == AT_LOST) return column[column_of_loss(system)];
-    if (is_of_peak(of->place)) return peak_change(&x->solver, c, of->index)[of->place - AT_PEAK_MAX];
+    if (is_of_peak(of->place)) return peak_change(peaks_of(&x->solver), c, of->index)[of->place - AT_PEAK_MAX];
     const double *change = column + column_of_event(system, event_kind(of->place), of->contact);
     if (event_part(of->place) == AT_DEPARTURE_TIME) return change[0];
     if (system->full == NULL)
@@ -107,7 +107,7 @@ static double remembered(Instance *x, const Variable *of, int c) {
 }
 
 /* Everything along a column. */
-static Status differentiate_along(Instance *x, int c, Direction *d) {
+Status derivatives_along(Instance *x, int c, Direction *d) {
     Solver *s = &x->solver;
     Sensitivity *w = &s->sensitivity;
     const double *column = column_at(s, c);
@@ -125,7 +125,7 @@ static Status derive(Instance *x) {
     Direction d;
     if (all->moving && instance_factor(x) != OK) return FAILED;
     for (int c = 0, k = all->first; c < COLUMN_COUNT; c++) {
-        if (all->moving && differentiate_along(x, c, &d) != OK) return FAILED;
+        if (all->moving && derivatives_along(x, c, &d) != OK) return FAILED;
         for (; k < all->end[c]; k++) {
             const Variable *of = &VARIABLES[VARIABLES[k].index];
             double *value = &all->value[k - all->first];
@@ -139,43 +139,14 @@ static Status derive(Instance *x) {
     return OK;
 }
 
-/* ------------------------------------------------------------------ extremes */
-
-/* Changes (PEAK_COUNT) of the quantities whose extremes are kept, along a column or, -1, the motion. */
-static Status change_of_peaked(Solver *s, int c, double *changes) {
-    Instance *x = s->caller;
-    Direction d;
-    x->seen.asked = 1;
-    if (solver_observe(s, &x->seen) != OK) return FAILED;
-    x->observed = 1; /* of this state, until it has been differentiated */
-    Status status = c < 0 ? instance_rates(x, &d) : instance_factor(x);
-    if (c >= 0 && status == OK) status = differentiate_along(x, c, &d);
-    for (int k = 0; k < PEAK_COUNT && status == OK; k++)
-        if (instance_change(x, &PEAKED[k], d, &changes[k]) != OK) changes[k] = 0;
-    x->observed = x->evaluated = 0;
-    return status;
-}
-
-static const char *name_of_asked(int c, int k, int part) {
-    for (int j = 0; j < VARIABLE_COUNT; j++) {
-        const Variable *of = is_derivative(j) && VARIABLES[j].contact == c ? &VARIABLES[VARIABLES[j].index] : NULL;
-        if (of != NULL && of->index == k && of->place == (Place)(AT_PEAK_MAX + part)) return of->name;
-    }
-    return NULL;
-}
-
-static int any_of_peaks(void) {
+/* How many columns extremes are differentiated by. */
+static int of_peaks(int columns) {
     for (int j = 0; j < VARIABLE_COUNT; j++)
-        if (is_derivative(j) && is_of_peak(VARIABLES[VARIABLES[j].index].place)) return 1;
+        if (is_derivative(j) && is_of_peak(VARIABLES[VARIABLES[j].index].place)) return columns;
     return 0;
 }
 
-static void prepare_peaks(Instance *x) {
-    x->solver.caller = x;
-    x->solver.peak_columns = any_of_peaks() ? COLUMN_COUNT : 0;
-    x->solver.measure_change = change_of_peaked;
-    x->solver.peak_asked = name_of_asked;
-}
+const Variable *derivatives_of(int j) { return is_derivative(j) ? &VARIABLES[VARIABLES[j].index] : NULL; }
 
 /* ------------------------------------------------------------------ */
 
@@ -198,4 +169,4 @@ static Status get_derivative(Instance *x, const Variable *v, double *value) {
     return OK;
 }
 
-SHARED_VALUE const Derivatives OF_RUN = {prepare_peaks, layout_derivatives, start_derivatives, forget, get_derivative, tell_of_end};
+SHARED_VALUE const Derivatives OF_RUN = {of_peaks, &PEAK_CHANGES, layout_derivatives, start_derivatives, forget, get_derivative, tell_of_end};

@@ -7,14 +7,15 @@
 
 #include "arena.h"
 #include "linkage.h"
+#include "sensitivity.h"
 #include "status.h"
 
 struct Instance;
 struct Variable;
 
 typedef struct {
-    /* Before any layout: are extremes differentiated? */
-    void (*prepare)(struct Instance *x);
+    int (*of_peaks)(int columns); /* by how many of them extremes are differentiated, ... */
+    const void *changes;          /* ... and by whom (peaks.h) */
     void (*layout)(struct Instance *x, Arena *scratch);
     /* Columns at the start that has been found. */
     Status (*start)(struct Instance *x);
@@ -26,5 +27,9 @@ typedef struct {
 } Derivatives;
 
 SHARED const Derivatives OF_RUN;
+
+/* Everything along column c; the variable whose derivative stands at position j, or NULL. */
+SHARED Status derivatives_along(struct Instance *x, int c, Direction *d);
+SHARED const struct Variable *derivatives_of(int j);
 
 #endif

@@ -11,6 +11,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "feature.h"
 #include "indicators.h"
 #include "losses.h"
 #include "optional.h"
@@ -113,9 +114,9 @@ static Status judge_step(Instance *x, int *event) {
 
 Status exchange_step_done(Instance *x, int *event) {
     if (judge_step(x, event) != OK) return FAILED;
-    if (x->solver.peaks == 0) return OK;
-    x->observed = x->evaluated = 0;
-    return OPTIONAL.peaks->step(&x->solver, event);
+    if (features_everywhere(&x->solver)) x->observed = x->evaluated = 0;
+    FEATURES_DO(&x->solver, exchanged, &x->solver, event);
+    return OK;
 }
 
 /* The switch states; `changed`: 1 if one is not what it was. */
@@ -201,19 +202,19 @@ static Status moving(Instance *x, Status (*act)(Instance *)) {
     return OK;
 }
 
-/* Extremes that are kept know both sides of an event. */
-static Status look_for_extreme(Instance *x) {
-    if (x->solver.peaks == 0) return OK;
-    x->observed = x->evaluated = 0;
-    return OPTIONAL.peaks->here(&x->solver, 0);
+/* Features know both sides of an event. */
+static Status tell_features(Instance *x) {
+    if (features_everywhere(&x->solver)) x->observed = x->evaluated = 0;
+    FEATURES_DO(&x->solver, after, &x->solver);
+    return OK;
 }
 
 Status exchange_enter_event(Instance *x) {
-    return moving(x, come_back) == OK ? look_for_extreme(x) : FAILED;
+    return moving(x, come_back) == OK ? tell_features(x) : FAILED;
 }
 
 Status exchange_event(Instance *x, int *moved) {
-    if (moving(x, pass_event) != OK || look_for_extreme(x) != OK) return FAILED;
+    if (moving(x, pass_event) != OK || tell_features(x) != OK) return FAILED;
     *moved = x->moved;
     x->moved = 0;
     return exchange_find_gain(x);

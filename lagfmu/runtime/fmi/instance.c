@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "algebraic.h"
+#include "feature.h"
 #include "indicators.h"
 
 static void *after(Arena *arena, char **base, size_t size) {
@@ -12,20 +13,12 @@ static void *after(Arena *arena, char **base, size_t size) {
     return *base;
 }
 
-/* The quantities whose extremes are kept, at a state. */
-static Status measure_peaked(Solver *s, const Observed *o, double *values) {
-    for (int k = 0; k < PEAK_COUNT; k++)
-        if (instance_value(s, o, &PEAKED[k], &values[k]) != OK) return FAILED;
-    return OK;
-}
-
 void instance_layout(Instance *x, Arena *arena) {
     const System *system = MODEL_SYSTEM;
-    x->solver.peaks = PEAK_COUNT;
-    x->solver.measure = measure_peaked;
+    x->solver.features = FEATURES;
+    x->solver.caller = x;
     x->solver.columns = COLUMN_COUNT;
     x->solver.column = COLUMNS;
-    if (DERIVATIVES != NULL) DERIVATIVES->prepare(x);
     Arena saved = {NULL, 0}, scratch = {NULL, 0};
     for (int pass = 0; pass < 2; pass++) {
         solver_layout(&x->solver, &saved, &scratch, system);

@@ -27,29 +27,35 @@ typedef struct {
     int paused;              /* 1: it looks */
 } Between;
 
+/* Numbers of an instance that a saved state holds, as in saved.h. */
+#define INSTANCE_NUMBERS(N)                                                                                           \
+    N(double, start_time, FINITE, "start time")               /* [s] of the experiment; its end is solver.stop_time */ \
+    N(double, tolerance, SIZE, "tolerance")                   /* of the experiment; 0: none */                        \
+    N(double, gain, FINITE, "stabilization")                  /* [1/s] of model exchange; < 0: not known yet */       \
+    N(int, exchange, FLAG, "type")                            /* 1: an importer's integrator moves the state (exchange.h) */ \
+    N(int, phase, OTHER, "mode")                              /* for the caller */                                    \
+    N(int, started, FLAG, "mode")                             /* 1: the consistent start has been found */            \
+    N(int, running, FLAG, "mode")                             /* 1: the start is over, only inputs can be set */      \
+    N(int, warned, OTHER, "mode")                             /* 1: a jump of a prescribed motion has been told; 2 << i:
+                                                               * lookup i outside */                                  \
+    N(int, moved, FLAG, "whether an event has moved the states")   /* in model exchange, since this was told */       \
+    N(int, ticking, FLAG, "whether clocks tick")              /* 1: an event of this instant has been met, and not yet
+                                                               * what follows from it */                              \
+    N(int, imposed, FLAG, "multipliers")                      /* 1: an importer solves for them (algebraic.h) */
+
 typedef struct Instance {
     Solver solver;
+    INSTANCE_NUMBERS(SAVED_MEMBER)
+    Settings given;         /* solver.* as they were set; tolerance 0: not set */
     Between between;        /* context: that of tell() */
     Observed seen;          /* what can be read at the state; belongs to it while `observed` is 1 */
     unsigned long motion;   /* evaluations of the solver when it was observed */
     Sensitivity along;      /* of the full system, where there is an embedding */
     Instant at;             /* of instance_factor() */
-    Settings given;         /* solver.* as they were set; tolerance 0: not set */
-    double start_time;            /* [s] of the experiment; its end is solver.stop_time */
-    double tolerance;             /* of the experiment; 0: none */
-    int exchange;           /* 1: an importer's integrator moves the state (exchange.h) */
-    int phase;              /* for the caller, saved with the state */
-    int started;            /* 1: the consistent start has been found */
-    int running;            /* 1: the start is over, only inputs can be set */
     Bars *bars;             /* error bars; NULL without */
     struct Derived *derived; /* of derivatives.c; NULL without a run's derivatives */
     Past *past;             /* (estimated_count of the system) */
-    double gain;            /* [1/s] of model exchange's stabilization; < 0: not known yet */
-    int ticking;            /* 1: an event of this instant has been met, and not yet what follows from it */
-    int imposed;            /* 1: an importer solves for the multipliers (algebraic.h), and has set them to ... */
-    double *multiplier;     /* (m) these */
-    int moved;              /* 1: in model exchange, an event has changed the states since this was told */
-    int warned;             /* 1: a jump of a prescribed motion has been told; 2 << i: lookup i outside */
+    double *multiplier;     /* (m) those that an importer has set */
     double *places;         /* (lookup_count) scratch */
     int observed, evaluated;
     int followed;           /* 1: the state goes with a motion that was set; as it was in `backup` */

@@ -58,46 +58,25 @@ Status instance_differentiate(Instance *x, Direction d) {
     return instance_factor(x) == OK ? instance_differentiate_factored(x, d, sensitivity_along) : FAILED;
 }
 
+#define CHANGES(place, value, it) case AT_##place: *change = it; break;
+
 Status instance_change(const Instance *x, const Variable *v, Direction d, double *change) {
     const Solver *s = &x->solver;
     const int embedded = s->system->full != NULL;
     const Mechanism *b = embedded ? &s->full : &s->stepped;
     const Sensitivity *w = embedded ? &x->along : &s->sensitivity;
     const double *dq = embedded ? w->dq : d.dq, *dv = embedded ? w->dv : d.dv;
+    const Observed *o = &x->seen;
+    const int i = v->index;
     *change = 0;
     switch (v->place) {
-        case AT_Q: *change = dq[v->index]; break;
-        case AT_V: *change = dv[v->index]; break;
-        case AT_VDOT: *change = w->dvdot[v->index]; break;
-        case AT_QDOT: *change = w->drate[v->index]; break;
-        case AT_S: *change = d.dq[v->index]; break;
-        case AT_SDOT: *change = d.dv[v->index]; break;
-        case AT_SDDOT: *change = s->sensitivity.dvdot[v->index]; break;
-        case AT_LAMBDA: *change = w->dlambda[v->index]; break;
-        case AT_RESIDUAL:
-            *change = sensitivity_residual(w, b, v->index, x->seen.v, dv);
-            break;
-        case AT_RESIDUAL_RATE: *change = sensitivity_slip(w, b, v->index, x->seen.v, dv); break;
-        case AT_RESIDUAL_ACCELERATION: *change = sensitivity_acceleration(w, b, v->index); break;
-        case AT_FORCE: *change = w->dforce[v->index]; break;
-        case AT_SHARE: *change = sensitivity_share(w, b, v->index); break;
-        case AT_KINETIC: *change = w->denergy[0]; break;
-        case AT_POTENTIAL: *change = w->denergy[1]; break;
-        case AT_TOTAL: *change = w->denergy[0] + w->denergy[1]; break;
-        case AT_OUTPUT: *change = w->down[v->index]; break;
-        case AT_SLIP: *change = w->dslip[v->index]; break;
-        case AT_MARGIN: *change = w->dmargin[v->index]; break;
-        case AT_POWER: *change = w->dpower[v->index]; break;
-        case AT_LOST_RATE:
-            for (int i = 0; i < s->system->frictions; i++) *change -= w->dpower[i];
-            break;
+        PLACES_READY(CHANGES) PLACES_OBSERVED(CHANGES)
+        case AT_RESIDUAL_RATE: *change = sensitivity_slip(w, b, i, o->v, dv); break;
+        case AT_RESIDUAL_ACCELERATION: *change = sensitivity_acceleration(w, b, i); break;
         case AT_INPUT: *change = d.du[v->index]; break;
-        case AT_TIME: *change = d.dt; break;
         case AT_ERROR: case AT_INDICATOR: case AT_SENSITIVITY: *change = NAN; break; /* it is not known, or not asked for */
         default: break; /* discrete ones and parameters: none */
     }
-    if (v->place == AT_LAMBDA && !x->seen.unique[v->index])
-        *change = NAN;
     return isfinite(*change) ? OK : FAILED;
 }
 

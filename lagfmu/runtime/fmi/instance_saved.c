@@ -9,9 +9,11 @@
 typedef struct {
     Numbers now;
     Settings settings, given;
-    double since, start_time, stop_time, tolerance, gain;
-    int exchange, phase, started, running, warned, moved, ticking, imposed;
+    double since, stop_time;
+    INSTANCE_NUMBERS(SAVED_MEMBER)
 } Record;
+#define PUT(type, member, sort, name) x->member = head.member;
+#define TAKE_NUMBER(type, member, sort, name) head.member = x->member;
 
 static size_t record_head(void) { return (sizeof(Record) + 15) / 16 * 16; }
 
@@ -26,19 +28,9 @@ void instance_restore(Instance *x, const char *record) {
     s->settings = head.settings;
     x->given = head.given;
     s->drive.since = head.since;
-    x->start_time = head.start_time;
     s->stop_time = head.stop_time;
-    x->tolerance = head.tolerance;
-    x->exchange = head.exchange;
-    x->phase = head.phase;
-    x->started = head.started;
-    x->running = head.running;
-    x->moved = head.moved;
-    x->ticking = head.ticking;
-    x->gain = head.gain;
-    x->imposed = head.imposed;
+    INSTANCE_NUMBERS(PUT)
     if (ALGEBRAIC != NULL) ALGEBRAIC->apply(x);
-    x->warned = head.warned;
     x->observed = x->evaluated = x->followed = 0;
     if (ERROR_BARS != NULL) ERROR_BARS->restore(x);
 }
@@ -59,18 +51,8 @@ void instance_save(Instance *x, char *record) {
     head.settings = s->settings;
     head.given = x->given;
     head.since = s->drive.since;
-    head.start_time = x->start_time;
     head.stop_time = s->stop_time;
-    head.tolerance = x->tolerance;
-    head.exchange = x->exchange;
-    head.phase = x->phase;
-    head.started = x->started;
-    head.running = x->running;
-    head.warned = x->warned;
-    head.moved = x->moved;
-    head.ticking = x->ticking;
-    head.imposed = x->imposed;
-    head.gain = x->gain;
+    INSTANCE_NUMBERS(TAKE_NUMBER)
     if (ERROR_BARS != NULL) ERROR_BARS->save(x);
     memcpy(record, &head, sizeof head);
     memset(record + sizeof head, 0, record_head() - sizeof head);

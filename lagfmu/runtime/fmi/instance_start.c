@@ -7,6 +7,7 @@
 
 #include "digits.h"
 #include "nominals.h"
+#include "feature.h"
 #include "optional.h"
 #include "segment.h"
 #include "thresholds.h"
@@ -146,7 +147,8 @@ static Status find_start(Instance *x) {
         nominals_complete(s, segment_instant(s, x->start_time), 1) != OK)
         return FAILED;
     if (DERIVATIVES != NULL && DERIVATIVES->start(x) != OK) return FAILED;
-    return s->peaks > 0 ? OPTIONAL.peaks->here(s, 1) : OK;
+    FEATURES_DO(s, start, s);
+    return OK;
 }
 
 Status instance_start(Instance *x) {

@@ -7,7 +7,7 @@
 
 #include "algebraic.h"
 #include "exchange.h"
-#include "peaks.h"
+#include "feature.h"
 #include "prescribed.h"
 
 /* What is read after an input was set is read at the state with which the next step begins. */
@@ -66,32 +66,30 @@ static double of_event(const Solver *s, const Observed *o, const Variable *v) {
     return (of_q ? o->latest_q : o->latest_v)[event_kind(v->place)][at];
 }
 
+#define READY(place, it, change) case AT_##place: *value = it; return 1;
+#define OBSERVED(place, it, change) case AT_##place: *value = it; break;
+
 /* Values that lie ready in the state; 0 if the value has to be calculated first. */
 static int ready(const Solver *s, const Variable *v, double *value) {
     const int embedded = s->system->full != NULL;
     if (is_of_event(v->place)) return ready_of_event(s, v, value);
-    if (is_of_peak(v->place)) {
-        *value = s->peak[PEAK_PARTS * v->index + (int)(v->place - AT_PEAK_MAX)];
-        return 1;
-    }
+    const int i = v->index;
     switch (v->place) {
         case AT_Q:
-            if (embedded) return 0;
-            *value = s->state.q[v->index];
-            return 1;
         case AT_V:
             if (embedded) return 0;
-            *value = s->state.v[v->index];
+            *value = (v->place == AT_Q ? s->state.q : s->state.v)[i];
             return 1;
-        case AT_S: *value = s->state.q[v->index]; return 1;
-        case AT_SDOT: *value = s->state.v[v->index]; return 1;
-        case AT_TIME: *value = s->state.now.t; return 1;
-        case AT_STEPS: *value = (double)s->state.now.steps; return 1;
-        case AT_CONTACT: *value = s->state.closed[v->index]; return 1;
-        case AT_IMPULSE: *value = s->state.impulse[v->index]; return 1;
-        case AT_LOST: *value = s->state.now.lost; return 1;
-        default: return 0;
+            PLACES_READY(READY)
+        default: break;
     }
+    for (const Feature *const *f = s->features; f != NULL && *f != NULL; f++) {
+        const double *of_feature = (*f)->value != NULL ? (*f)->value(s, (int)v->place, v->index) : NULL;
+        if (of_feature == NULL) continue;
+        *value = *of_feature;
+        return 1;
+    }
+    return 0;
 }
 
 Status instance_value(Solver *s, const Observed *o, const Variable *v, double *value) {
@@ -100,30 +98,9 @@ Status instance_value(Solver *s, const Observed *o, const Variable *v, double *v
         *value = of_event(s, o, v);
         return OK;
     }
+    const int i = v->index;
     switch (v->place) {
-        case AT_Q: *value = o->q[v->index]; break;
-        case AT_V: *value = o->v[v->index]; break;
-        case AT_VDOT: *value = o->vdot[v->index]; break;
-        case AT_QDOT: *value = o->rate[v->index]; break;
-        case AT_SDDOT: *value = o->sddot[v->index]; break;
-        case AT_LAMBDA: *value = o->lambda[v->index]; break;
-        case AT_UNIQUE: *value = o->unique[v->index]; break;
-        case AT_OUTPUT_UNIQUE: *value = o->own_unique[v->index]; break;
-        case AT_RESIDUAL: *value = o->residual[v->index]; break;
-        case AT_FORCE: *value = o->force[v->index]; break;
-        case AT_SHARE: *value = o->share[v->index]; break;
-        case AT_KINETIC: *value = o->energy[0]; break;
-        case AT_POTENTIAL: *value = o->energy[1]; break;
-        case AT_TOTAL: *value = o->energy[0] + o->energy[1]; break;
-        case AT_STICKS: *value = o->sticks[v->index]; break;
-        case AT_SLIP: *value = o->slip[v->index]; break;
-        case AT_MARGIN: *value = o->margin[v->index]; break;
-        case AT_POWER: *value = o->power[v->index]; break;
-        case AT_LOST_RATE:
-            *value = 0;
-            for (int i = 0; i < s->system->frictions; i++) *value -= o->power[i];
-            break;
-        case AT_OUTPUT: *value = o->own[v->index]; break;
+        PLACES_OBSERVED(OBSERVED)
         default: return fail(&s->why, "%s has no value", v->name);
     }
     return OK;

@@ -2,18 +2,17 @@
  *
  * Bytes come from a file, or from anyone.  A checksum tells altered bytes, not forged ones: an index, a
  * count, a mode or a time that no simulation has would be followed blindly.  So each number has a range,
- * and numbers that belong together are held against each other.  Whoever adds to State, Settings, Drive
- * or Instance what is saved adds a line here. */
+ * and numbers that belong together are held against each other.  What is saved says in its own row (state.h,
+ * instance.h) what it may be. */
 #include "instance.h"
 
 #include <float.h>
 #include <limits.h>
 #include <math.h>
-#include <stddef.h>
-#include <string.h>
 
 #include "algebraic.h"
 #include "digits.h"
+#include "feature.h"
 #include "indicators.h"
 #include "optional.h"
 #include "prescribed.h"
@@ -21,129 +20,6 @@
 
 enum { MOST = INT_MAX / 2 }; /* of a count that is going to be increased, ... */
 static const double MOST_EVER = 1 / DBL_EPSILON; /* ... and of what a run does: 2^52, in ten thousand years */
-
-/* What a number can be: an int that is 0 or 1, or counts; a count of what a run does; a double that is 0 or
- * more, and may be infinite, or any finite one. */
-enum { FLAG, COUNT, TALLY, SIZE, LIMIT, FINITE };
-
-/* How many of them there are; more than ONE stand behind a pointer. */
-enum {
-    ONE, COORDINATES, SPEEDS, STATES, JOINT_STARTS, ROWS, CONTACTS, CONTACTS_COORDINATES, CONTACTS_SPEEDS, FRICTIONS,
-    FRICTIONS_COORDINATES, FRICTIONS_SPEEDS, INPUTS, SWITCH_STATES, PARAMETERS, PEAKS_KEPT, WATCHED, DENSE,
-    STEPPED, VARIATIONS, VARIED, GIVEN_ROWS
-};
-
-typedef struct {
-    const char *name;
-    unsigned short at; /* of Solver or Instance */
-    unsigned char sort, many;
-} Saved;
-
-#define NOW(name, member, sort) {name, offsetof(Solver, state.now.member), sort, ONE}
-#define SOLVER(name, member, sort, many) {name, offsetof(Solver, member), sort, many}
-#define LATEST(name, kind, many) \
-    SOLVER(name, state.latest[kind].count, TALLY, many), SOLVER(name, state.latest[kind].time, FINITE, many), \
-        SOLVER(name, state.latest[kind].q, FINITE, many##_COORDINATES), \
-        SOLVER(name, state.latest[kind].v, FINITE, many##_SPEEDS)
-#define INSTANCE(name, member, sort, many) {name, offsetof(Instance, member), sort, many}
-
-static const Saved OF_SOLVER[] = {
-    NOW("stiffness mode", choice.implicit, FLAG),
-    NOW("stiffness turn", choice.turn, FLAG),
-    NOW("stiffness memory", choice.unseen, COUNT),
-    NOW("stiffness memory", choice.stiff, COUNT),
-    NOW("stiffness memory", choice.other, COUNT),
-    NOW("stiffness memory", choice.taken, COUNT),
-    NOW("stiffness memory", choice.brief, COUNT),
-    NOW("stiffness memory", choice.failures, COUNT),
-    NOW("stiffness memory", choice.retries, COUNT),
-    NOW("stiffness memory", choice.longest, LIMIT),
-    NOW("stiffness memory", choice.span, LIMIT),
-    NOW("time of stiffness", choice.time, FINITE),
-    NOW("h rho", choice.product, LIMIT),
-    NOW("rho / sigma", choice.ratio, LIMIT),
-    NOW("step count", steps, TALLY),
-    NOW("step count", tiny, TALLY),
-    NOW("mode of the step ahead", ahead, FLAG),
-    NOW("mode of the step ahead", between, FLAG),
-    NOW("mode of the step ahead", fresh, FLAG),
-    NOW("rank of the constraints", dependent, FLAG),
-    NOW("approach to a singular configuration", approach.near, FLAG),
-    NOW("approach to a singular configuration", approach.t, FINITE),
-    NOW("approach to a singular configuration", approach.apart, FINITE),
-    NOW("approach to a singular configuration", approach.until, FINITE),
-    NOW("count of events", event_count, COUNT),
-    NOW("event that is reached", pending, FLAG),
-    NOW("time", t, FINITE),
-    NOW("natural rate", rate, LIMIT),
-    NOW("step", step, LIMIT),
-    NOW("communication step", span, SIZE),
-    NOW("next step", h_next, LIMIT),
-    NOW("error of the step", error_old, LIMIT),
-    NOW("integrator's time", t_integrator, FINITE),
-    NOW("integrator's time", t_old, FINITE),
-    NOW("time of the event", event_time, FINITE),
-    NOW("energy dissipated", lost, FINITE),
-    NOW("energy dissipated", lost_old, FINITE),
-    NOW("energy dissipated", lost_ahead, FINITE),
-    NOW("estimated error", estimated, SIZE),
-    SOLVER("coordinates", state.q, FINITE, COORDINATES),
-    SOLVER("velocities", state.v, FINITE, SPEEDS),
-    SOLVER("switch states", state.switch_state, FINITE, SWITCH_STATES),
-    SOLVER("offsets", state.offset, FINITE, ROWS),
-    SOLVER("scales", state.scale, SIZE, STATES),
-    SOLVER("sizes", state.size, SIZE, COORDINATES),
-    SOLVER("sizes", state.span, SIZE, SPEEDS),
-    SOLVER("gaps", state.gap, SIZE, CONTACTS),
-    SOLVER("rank of the constraints", state.basis, FLAG, ROWS),
-    SOLVER("modes", state.closed, FLAG, CONTACTS),
-    SOLVER("modes", state.armed, FLAG, CONTACTS),
-    LATEST("departures", DEPARTURE, CONTACTS),
-    LATEST("closings", CLOSING, CONTACTS),
-    LATEST("starts of slipping", SLIPPING, FRICTIONS),
-    LATEST("starts of sticking", STICKING, FRICTIONS),
-    SOLVER("impulses", state.impulse, SIZE, CONTACTS),
-    SOLVER("indicators", state.indicator, FINITE, WATCHED),
-    SOLVER("step ahead", integrator.y, FINITE, STEPPED),
-    SOLVER("step ahead", integrator.y_old, FINITE, STEPPED),
-    SOLVER("step ahead", integrator.f, FINITE, STEPPED),
-    SOLVER("step ahead", integrator.f_old, FINITE, STEPPED),
-    SOLVER("step ahead", integrator.dense, FINITE, DENSE),
-    SOLVER("derivatives of the run", state.variation, FINITE, VARIATIONS),
-    SOLVER("derivatives of the run", state.varied, FLAG, VARIED),
-    SOLVER("inputs", drive.value, FINITE, INPUTS),
-    SOLVER("inputs", drive.first, FINITE, INPUTS),
-    SOLVER("inputs", drive.second, FINITE, INPUTS),
-    SOLVER("parameters", p, FINITE, PARAMETERS),
-    SOLVER("peaks", peak, FINITE, PEAKS_KEPT),
-};
-
-static const Saved OF_INSTANCE[] = {
-    INSTANCE("type", exchange, FLAG, ONE),
-    INSTANCE("whether an event has moved the states", moved, FLAG, ONE),
-    INSTANCE("whether clocks tick", ticking, FLAG, ONE),
-    INSTANCE("multipliers", imposed, FLAG, ONE),
-    INSTANCE("multipliers", multiplier, FINITE, GIVEN_ROWS),
-    INSTANCE("stabilization", gain, FINITE, ONE),
-    INSTANCE("mode", started, FLAG, ONE),
-    INSTANCE("mode", running, FLAG, ONE),
-    INSTANCE("solver.tolerance", solver.settings.tolerance, SIZE, ONE),
-    INSTANCE("solver.step", solver.settings.step, SIZE, ONE),
-    INSTANCE("solver.maximum_step", solver.settings.maximum_step, SIZE, ONE),
-    INSTANCE("solver.maximum_steps", solver.settings.maximum_steps, SIZE, ONE),
-    INSTANCE("given tolerance", given.tolerance, SIZE, ONE),
-    INSTANCE("given step", given.step, SIZE, ONE),
-    INSTANCE("given maximum step", given.maximum_step, SIZE, ONE),
-    INSTANCE("given maximum steps", given.maximum_steps, SIZE, ONE),
-    INSTANCE("tolerance", tolerance, SIZE, ONE),
-    INSTANCE("start time", start_time, FINITE, ONE),
-    INSTANCE("time of the inputs", solver.drive.since, FINITE, ONE),
-    INSTANCE("inputs", set, FLAG, INPUTS),
-    INSTANCE("inputs", expected, FINITE, INPUTS),
-    INSTANCE("start values", q0, FINITE, COORDINATES),
-    INSTANCE("start values", v0, FINITE, SPEEDS),
-    INSTANCE("start values", joint0, FINITE, JOINT_STARTS),
-};
 
 Status restored_none(Instance *x, const char *name, double value) {
     return fail(&x->solver.why, "the saved state is none of this FMU's: its %s is %s", name,
@@ -155,47 +31,83 @@ static int offered(MethodName method) {
     return (int)method > 0 && (int)method < METHOD_COUNT && OPTIONAL.methods[method] != NULL;
 }
 
-/* Each number of a list inside of `base`, by itself. */
-static Status each(Instance *x, const Solver *s, const void *base, const Saved *list, size_t rows) {
+/* `many` numbers of the kind `size` bytes of each say, by themselves. */
+static Status sound(Instance *x, const void *where, size_t size, int many, Sort sort, const char *name) {
     static const double LEAST[] = {0, 0, 0, 0, 0, -DBL_MAX};
     static const double LARGEST[] = {1, MOST, MOST_EVER, DBL_MAX, HUGE_VAL, DBL_MAX};
-    const System *system = s->system;
-    const Method *now = x->started ? OPTIONAL.methods[s->state.now.choice.implicit ? RADAU5 : s->settings.method]
-                                   : NULL;
-    const int nq = system->nq, nv = system->nv;
-    const int many[] = {[ONE] = 1,
-                        [COORDINATES] = nq,
-                        [SPEEDS] = nv,
-                        [STATES] = nq + nv,
-                        [JOINT_STARTS] = 2 * system->joint_count,
-                        [ROWS] = system->m,
-                        [CONTACTS] = system->contacts,
-                        [CONTACTS_COORDINATES] = system->contacts * nq,
-                        [CONTACTS_SPEEDS] = system->contacts * nv,
-                        [FRICTIONS] = system->frictions,
-                        [FRICTIONS_COORDINATES] = system->frictions * nq,
-                        [FRICTIONS_SPEEDS] = system->frictions * nv,
-                        [INPUTS] = system->inputs,
-                        [SWITCH_STATES] = system->switches,
-                        [PARAMETERS] = system->parameters,
-                        [PEAKS_KEPT] = peaks_saved(s->peaks, s->peak_columns),
-                        [WATCHED] = indicators_count(system),
-                        [DENSE] = now == NULL ? 0 : now->dense_arrays * solver_width(s),
-                        [STEPPED] = solver_width(s),
-                        [VARIATIONS] = s->columns * column_size(system),
-                        [VARIED] = s->columns > 0,
-                        [GIVEN_ROWS] = ALGEBRAIC != NULL ? system->m : 0};
-    for (const Saved *row = list; row < list + rows; row++) {
-        const void *where = (const char *)base + row->at;
-        if (row->many != ONE) memcpy(&where, where, sizeof where);
-        for (int j = 0; j < many[row->many]; j++) {
-            const double value = row->sort <= COUNT   ? ((const int *)where)[j]
-                                 : row->sort == TALLY ? (double)((const Count *)where)[j]
-                                                      : ((const double *)where)[j];
-            if (!(value >= LEAST[row->sort] && value <= LARGEST[row->sort]))
-                return restored_none(x, row->name, value);
-        }
+    for (int j = 0; j < many && sort != OTHER; j++) {
+        const double value = size == sizeof(int) ? ((const int *)where)[j]
+                             : sort == TALLY     ? (double)((const Count *)where)[j]
+                                                 : ((const double *)where)[j];
+        if (!(value >= LEAST[sort] && value <= LARGEST[sort])) return restored_none(x, name, value);
     }
+    return OK;
+}
+
+#define SOUND(at, many, sort, name) \
+    if (sound(x, at, sizeof *(at), many, sort, name) != OK) return FAILED;
+#define SOUND_NUMBER(type, member, sort, name) SOUND(&of->member, 1, sort, name)
+#define SOUND_ARRAY(type, member, many, sort, name) SOUND(a->member, many, sort, name)
+
+static Status each_of_settings(Instance *x, const Settings *of) {
+    SETTINGS_NUMBERS(SOUND_NUMBER)
+    return OK;
+}
+
+static Status each_of_choice(Instance *x, const Choice *of) {
+    CHOICE_NUMBERS(SOUND_NUMBER)
+    return OK;
+}
+
+static Status each_of_approach(Instance *x, const Approach *of) {
+    APPROACH_NUMBERS(SOUND_NUMBER)
+    return OK;
+}
+
+static Status each_of_solver(Instance *x, const Solver *solver) {
+    static const char *const HAPPENED[EVENT_KINDS] = {"departures", "closings", "starts of slipping",
+                                                      "starts of sticking"};
+    const System *s = solver->system;
+    const State *a = &solver->state;
+    const Numbers *of = &a->now;
+    const Integrator *i = &solver->integrator;
+    const Method *now = x->started ? OPTIONAL.methods[of->choice.implicit ? RADAU5 : solver->settings.method] : NULL;
+    const int width = solver_width(solver);
+    if (each_of_choice(x, &of->choice) != OK || each_of_approach(x, &of->approach) != OK) return FAILED;
+    STATE_NUMBERS(SOUND_NUMBER)
+    STATE_ARRAYS(SOUND_ARRAY)
+    STATE_ARRAYS_BEHIND(SOUND_ARRAY)
+    for (int k = 0; k < EVENT_KINDS; k++) {
+        const int count = event_count_of(s, (EventKind)k);
+        SOUND(a->latest[k].count, count, TALLY, HAPPENED[k])
+        SOUND(a->latest[k].time, count, FINITE, HAPPENED[k])
+        SOUND(a->latest[k].q, count * s->nq, FINITE, HAPPENED[k])
+        SOUND(a->latest[k].v, count * s->nv, FINITE, HAPPENED[k])
+    }
+    SOUND(i->y, width, FINITE, "step ahead")
+    SOUND(i->y_old, width, FINITE, "step ahead")
+    SOUND(i->f, width, FINITE, "step ahead")
+    SOUND(i->f_old, width, FINITE, "step ahead")
+    SOUND(i->dense, now == NULL ? 0 : now->dense_arrays * width, FINITE, "step ahead")
+    SOUND(solver->drive.value, s->inputs, FINITE, "inputs")
+    SOUND(solver->drive.first, s->inputs, FINITE, "inputs")
+    SOUND(solver->drive.second, s->inputs, FINITE, "inputs")
+    SOUND(solver->p, s->parameters, FINITE, "parameters")
+    return OK;
+}
+
+static Status each_of_instance(Instance *x) {
+    const System *s = x->solver.system;
+    const Instance *of = x;
+    INSTANCE_NUMBERS(SOUND_NUMBER)
+    if (each_of_settings(x, &x->solver.settings) != OK || each_of_settings(x, &x->given) != OK) return FAILED;
+    SOUND(&x->solver.drive.since, 1, FINITE, "time of the inputs")
+    SOUND(x->set, s->inputs, FLAG, "inputs")
+    SOUND(x->expected, s->inputs, FINITE, "inputs")
+    SOUND(x->q0, s->nq, FINITE, "start values")
+    SOUND(x->v0, s->nv, FINITE, "start values")
+    SOUND(x->joint0, 2 * s->joint_count, FINITE, "start values")
+    SOUND(x->multiplier, ALGEBRAIC != NULL ? s->m : 0, FINITE, "multipliers")
     return OK;
 }
 
@@ -235,9 +147,10 @@ static Status together_in_solver(Instance *x, const Solver *s) {
     if (now->ahead && now->event_count > 0 &&
         !(now->event_time >= now->t_old && now->event_time <= now->t_integrator))
         return restored_none(x, "time of the event", now->event_time);
-    if (x->started && s->peaks > 0) { /* extremes are known as far as the state is */
-        const double reached = s->peak[peaks_saved(s->peaks, s->peak_columns) - 1];
-        if (x->exchange ? reached > now->t : reached != now->t) return restored_none(x, "time of the peaks", reached);
+    for (const Feature *const *f = s->features; f != NULL && *f != NULL; f++) {
+        double value;
+        const char *name = (*f)->flaw != NULL ? (*f)->flaw(s, x->started, x->exchange, &value) : NULL;
+        if (name != NULL) return restored_none(x, name, value);
     }
     return OK;
 }
@@ -283,14 +196,14 @@ static Status check_bounds(Instance *x) {
 }
 
 Status restored_solver(Instance *x, const Solver *s) {
-    if (each(x, s, s, OF_SOLVER, sizeof OF_SOLVER / sizeof *OF_SOLVER) != OK) return FAILED;
+    if (each_of_solver(x, s) != OK) return FAILED;
     if (together_in_solver(x, s) != OK || ways(x, s) != OK) return FAILED;
     return friction_modes(x, s);
 }
 
 Status instance_restored(Instance *x) {
     if (together(x) != OK) return FAILED;
-    if (each(x, &x->solver, x, OF_INSTANCE, sizeof OF_INSTANCE / sizeof *OF_INSTANCE) != OK) return FAILED;
+    if (each_of_instance(x) != OK) return FAILED;
     if (restored_solver(x, &x->solver) != OK) return FAILED;
     if (check_bounds(x) != OK || (PRESCRIBED != NULL && PRESCRIBED->restored(x) != OK)) return FAILED;
     return ERROR_BARS != NULL ? ERROR_BARS->restored(x) : OK;

@@ -12,40 +12,57 @@ typedef enum { TYPE_REAL, TYPE_INTEGER, TYPE_ENUMERATION, TYPE_BOOLEAN, TYPE_CLO
 /* what may set it */
 typedef enum { ROLE_PARAMETER, ROLE_START, ROLE_INPUT, ROLE_SOLVER, ROLE_OUTPUT } Role;
 
-/* where its value lies (`index`, and for events `contact`) */
+/* Where a value lies.  Of what is set: p[i], u[i], the solver's settings. */
+#define PLACES_SET(P) P(PARAMETER) P(METHOD) P(TOLERANCE) P(STEP) P(MAXIMUM_STEP) P(MAXIMUM_STEPS) P(INPUT)
+
+/* Of what lies ready in the state of a solver s: place, value, change along a direction d (i: `index`). */
+#define PLACES_READY(P)                                                                                              \
+    P(S, s->state.q[i], d.dq[i]) P(SDOT, s->state.v[i], d.dv[i])   /* of an embedding, if they are not full ones */  \
+    P(TIME, s->state.now.t, d.dt)                                                                                    \
+    P(STEPS, (double)s->state.now.steps, 0)                                                                          \
+    P(CONTACT, s->state.closed[i], 0) P(IMPULSE, s->state.impulse[i], 0)                                             \
+    P(LOST, s->state.now.lost, 0)                                  /* energy dissipated */
+
+/* Of what has to be observed, o; dq, dv: the change of the full coordinates and speeds; w: of the rest. */
+#define PLACES_OBSERVED(P)                                                                                           \
+    P(Q, o->q[i], dq[i]) P(V, o->v[i], dv[i]) P(VDOT, o->vdot[i], w->dvdot[i])                                       \
+    P(QDOT, o->rate[i], w->drate[i])                               /* of a coordinate that is none of the speeds */  \
+    P(SDDOT, o->sddot[i], s->sensitivity.dvdot[i])                                                                   \
+    P(LAMBDA, o->lambda[i], o->unique[i] ? w->dlambda[i] : NAN)    /* of row i */                                    \
+    P(UNIQUE, o->unique[i], 0)                                                                                       \
+    P(RESIDUAL, o->residual[i], sensitivity_residual(w, b, i, o->v, dv))                                             \
+    P(FORCE, o->force[i], w->dforce[i])                            /* Q[i] */                                        \
+    P(SHARE, o->share[i], sensitivity_share(w, b, i))              /* of entry i of G */                             \
+    P(KINETIC, o->energy[0], w->denergy[0]) P(POTENTIAL, o->energy[1], w->denergy[1])                                \
+    P(TOTAL, o->energy[0] + o->energy[1], w->denergy[0] + w->denergy[1])                                             \
+    P(OUTPUT, o->own[i], w->down[i]) P(OUTPUT_UNIQUE, o->own_unique[i], 0) /* the model's own */                     \
+    P(STICKS, o->sticks[i], 0) P(MARGIN, o->margin[i], w->dmargin[i]) P(POWER, o->power[i], w->dpower[i])            \
+    P(SLIP, o->slip[i], w->dslip[i])                               /* twice the friction's, 1 more for its second row */ \
+    P(LOST_RATE, minus_sum(o->power, s->system->frictions), minus_sum(w->dpower, s->system->frictions))
+
+/* Of the latest event of contact, or friction, `contact`, in the order of EventKind. */
+#define PLACES_OF_EVENT(P, kind) P(kind##_COUNT) P(kind##_TIME) P(kind##_Q) P(kind##_V)
+
+#define PLACE(place) AT_##place,
+#define PLACE_READ(place, value, change) AT_##place,
 typedef enum {
-    AT_PARAMETER,      /* p[index] */
-    AT_METHOD, AT_TOLERANCE, AT_STEP, AT_MAXIMUM_STEP, AT_MAXIMUM_STEPS,
-    AT_INPUT,          /* u[index] */
-    AT_Q, AT_V, AT_VDOT,       /* full coordinates, speeds */
-    AT_QDOT,                   /* the rate of a full coordinate that is none of the speeds */
-    AT_S, AT_SDOT, AT_SDDOT,   /* stepped coordinates of an embedding that are not full ones */
-    AT_LAMBDA, AT_UNIQUE, AT_RESIDUAL, /* row index */
-    AT_RESIDUAL_RATE, AT_RESIDUAL_ACCELERATION, /* the same: G v - nu, G vdot - gamma (algebraic.h) */
-    AT_FORCE,          /* Q[index] */
-    AT_SHARE,          /* entry index of G */
-    AT_KINETIC, AT_POTENTIAL, AT_TOTAL,
-    AT_OUTPUT,         /* own output index */
-    AT_OUTPUT_UNIQUE,  /* its number among those of which that is asked */
-    AT_CONTACT, AT_IMPULSE,                  /* contact index */
-    AT_STEPS,
-    AT_STICKS, AT_MARGIN, AT_POWER,          /* friction index */
-    AT_SLIP,                                 /* twice the friction's index, and one more for its second row */
-    /* of the latest event of contact, or friction, `contact`, in the order of EventKind: how often and when; full
-     * coordinate index */
-    AT_DEPARTURE_COUNT, AT_DEPARTURE_TIME, AT_DEPARTURE_Q, AT_DEPARTURE_V,
-    AT_CLOSING_COUNT, AT_CLOSING_TIME, AT_CLOSING_Q, AT_CLOSING_V,
-    AT_SLIPPING_COUNT, AT_SLIPPING_TIME, AT_SLIPPING_Q, AT_SLIPPING_V,
-    AT_STICKING_COUNT, AT_STICKING_TIME, AT_STICKING_Q, AT_STICKING_V,
+    PLACES_SET(PLACE) PLACES_READY(PLACE_READ) PLACES_OBSERVED(PLACE_READ)
+    AT_RESIDUAL_RATE, AT_RESIDUAL_ACCELERATION, /* G v - nu, G vdot - gamma (algebraic.h) */
+    PLACES_OF_EVENT(PLACE, DEPARTURE) PLACES_OF_EVENT(PLACE, CLOSING) PLACES_OF_EVENT(PLACE, SLIPPING)
+    PLACES_OF_EVENT(PLACE, STICKING)
     AT_PEAK_MAX, AT_PEAK_MIN, AT_PEAK_MAX_TIME, AT_PEAK_MIN_TIME, /* number of the quantity */
-    AT_LOST, AT_LOST_RATE,                   /* energy dissipated, and its derivative by frictions */
-    AT_TIME,
     AT_INDICATOR,      /* event indicator index */
     AT_CLOCK,          /* of contact, or after those friction, index */
     AT_SENSITIVITY,    /* derivative of the variable at position `index` by what column `contact` is taken by */
     AT_SENSITIVITY_VALID,
     AT_ERROR           /* error bar number `contact`, of the variable at position `index` (bars.h) */
 } Place;
+
+static inline double minus_sum(const double *x, int count) {
+    double sum = 0;
+    for (int k = 0; k < count; k++) sum -= x[k];
+    return sum;
+}
 
 typedef struct Variable {
     const char *name;

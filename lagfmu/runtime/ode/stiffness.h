@@ -4,26 +4,32 @@
 
 #include "integrator.h"
 #include "linkage.h"
+#include "saved.h"
 
 enum {
     STIFFNESS_MOST_FAILURES = 8, /* times that the stiff steps asked for are made four times as many */
     STIFFNESS_MOST_RETRIES = 20  /* times that the steps before a retry are made twice as many */
 };
 
-/* What the choice remembers; all zero at the start. */
+/* What the choice remembers, as in saved.h; all zero at the start. */
+#define CHOICE_NUMBERS(N)                                                                          \
+    N(int, implicit, FLAG, "stiffness mode")    /* 1: radau5 is at work */                         \
+    N(int, turn, FLAG, "stiffness turn")        /* 1: the other method takes over before the next step */ \
+    N(int, unseen, COUNT, "stiffness memory")   /* dop853's steps since one was judged */          \
+    N(int, stiff, COUNT, "stiffness memory")    /* of them, its stiff steps so far; ... */         \
+    N(int, other, COUNT, "stiffness memory")    /* ... others in a row */                          \
+    N(int, taken, COUNT, "stiffness memory")    /* radau5's steps; ... */                          \
+    N(int, brief, COUNT, "stiffness memory")    /* ... those in a row that did not pay */          \
+    N(int, failures, COUNT, "stiffness memory") /* how often in a row radau5 did not pay */        \
+    N(int, retries, COUNT, "stiffness memory")  /* how often dop853 was tried again */             \
+    N(double, longest, LIMIT, "stiffness memory") /* [s] the longest of dop853's stiff steps */    \
+    N(double, span, LIMIT, "stiffness memory")  /* [s] covered by radau5's steps */                \
+    N(double, time, FINITE, "time of stiffness") /* [s] when radau5 first took over, ... */        \
+    N(double, product, LIMIT, "h rho")          /* ... h rho then (0: it never did), ... */        \
+    N(double, ratio, LIMIT, "rho / sigma")      /* ... and rho / sigma (0: the motion's own rate was not known) */
+
 typedef struct {
-    int implicit;     /* 1: radau5 is at work */
-    int turn;         /* 1: the other method takes over before the next step */
-    int unseen;       /* dop853's steps since one was judged */
-    int stiff, other; /* of them, its stiff steps so far; others in a row */
-    int taken, brief; /* radau5's steps; those in a row that did not pay */
-    int failures;     /* how often in a row radau5 did not pay */
-    int retries;      /* how often dop853 was tried again */
-    double longest;   /* [s] the longest of dop853's stiff steps */
-    double span;      /* [s] covered by radau5's steps */
-    double time;      /* [s] when radau5 first took over, ... */
-    double product;   /* ... h rho then (0: it never did), ... */
-    double ratio;     /* ... and rho / sigma (0: the motion's own rate was not known) */
+    CHOICE_NUMBERS(SAVED_MEMBER)
 } Choice;
 
 /* 1 if the step that dop853 has just taken is to be judged: one in three, each from a stiff one on. */

@@ -9,6 +9,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "feature.h"
 #include "indicators.h"
 #include "nominals.h"
 #include "optional.h"
@@ -117,7 +118,7 @@ static Status step_towards(Solver *s, double t_end, double bound, double longest
     s->taken = fmax(s->taken, i->t - i->t_old);
     s->state.now.estimated = fmax(s->state.now.estimated, i->error * segment_tolerance(s));
     const int near = OPTIONAL.passage != NULL && OPTIONAL.passage->suspected(s);
-    if ((watch || near || s->peaks > 0 || i->t > t_end) && segment_prepare_dense(s, i) != OK) return FAILED;
+    if ((watch || near || features_everywhere(s) || i->t > t_end) && segment_prepare_dense(s, i) != OK) return FAILED;
     memcpy(y1, i->y, (size_t)i->ny * sizeof *y1);
     if (segment_project(s, i->t, y1) != OK) return FAILED;
     if (segment_check_projection(s, i->t, i->y, y1) != OK) return FAILED;
@@ -193,7 +194,7 @@ static Status put_between(Solver *s, double t) {
 
 /* Tables are looked at and work is summed at each communication point. */
 static int waits(const Solver *s) {
-    return s->on_demand && s->peaks == 0 && s->system->lookup_count == 0 && s->system->frictions == 0 && runs_ahead(s);
+    return s->on_demand && !features_everywhere(s) && s->system->lookup_count == 0 && s->system->frictions == 0 && runs_ahead(s);
 }
 
 Status solver_arrive(Solver *s) {
@@ -248,7 +249,7 @@ static Status arrive(Solver *s, double t_end) {
         return FAILED;
     }
     if (s->system->frictions > 0 && count_loss(s, t_end) != OK) return FAILED;
-    if (s->peaks > 0 && OPTIONAL.peaks->pass(s, t_end, NULL) != OK) return FAILED;
+    FEATURES_DO(s, pass, s, t_end, NULL);
     now->step = i->h_next;
     if (!runs_ahead(s)) now->ahead = 0;
     return OK;
@@ -271,7 +272,7 @@ static Status reach_event(Solver *s) {
     if (s->system->frictions > 0 && count_loss(s, t) != OK) return FAILED;
     if (segment_reach(s, i->t_old, i->y_old, t, y) != OK) return FAILED;
     put(s, t, y);
-    if (s->peaks > 0 && OPTIONAL.peaks->pass(s, t, y) != OK) return FAILED;
+    FEATURES_DO(s, pass, s, t, y);
     s->state.now.step = i->t - i->t_old;
     if (s->state.now.choice.implicit) {
         s->state.now.step = fmin(s->state.now.step, s->state.now.choice.longest);
@@ -288,10 +289,12 @@ Status solver_meet(Solver *s) {
     if (!s->state.now.pending) return OK;
     s->state.now.pending = 0;
     segment_begin(s);
-    if (s->peak_columns > 0) OPTIONAL.variation->peaks_before(s);
+    for (const Feature *const *f = s->features; f != NULL && *f != NULL; f++)
+        if ((*f)->before != NULL) (*f)->before(s);
     const Status switched = s->columns > 0 ? OPTIONAL.variation->pass(s, switch_modes) : switch_modes(s, NULL, 0, 0);
     if (switched != OK) return FAILED;
-    return s->peaks > 0 ? OPTIONAL.peaks->here(s, 0) : OK;
+    FEATURES_DO(s, after, s);
+    return OK;
 }
 
 /* Appends the names of the contacts and frictions that have changed since a time [s]; 0 if there are none. */
@@ -382,7 +385,7 @@ static Status travel(Solver *s, double *end, double begun, Count first, int *met
             return halts_before(s, t_end) ? OK : solver_meet(s);
         }
         if (s->integrator.t >= t_end) return arrive(s, t_end);
-        if (s->peaks > 0 && OPTIONAL.peaks->pass(s, s->integrator.t, NULL) != OK) return FAILED;
+        FEATURES_DO(s, pass, s, s->integrator.t, NULL);
         if (take_step(s, t_end) != OK) {
             if (now->approach.near) OPTIONAL.passage->explain(s);
             return FAILED;

@@ -11,10 +11,6 @@
 #include "optional.h"
 #include "segment.h"
 
-int indicators_count(const System *s) { return s->contacts + s->switches + 2 * s->frictions; }
-
-int indicators_first_of_frictions(const System *s) { return s->contacts + s->switches; }
-
 static Status of_contacts(Solver *s, double t, const double *y, double *values) {
     const System *system = s->system;
     const Instant at = segment_instant(s, t);

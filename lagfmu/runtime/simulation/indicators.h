@@ -21,12 +21,6 @@ typedef struct {
     int rises; /* 1: it begins on the limit, and has to be seen inside first */
 } Range;
 
-/* How many are watched. */
-SHARED int indicators_count(const System *s);
-
-/* The number of the first that belongs to a friction. */
-SHARED int indicators_first_of_frictions(const System *s);
-
 /* All values at (t, y), in the present modes. */
 SHARED Status indicators_at(Solver *s, double t, const double *y, double *values);
 

@@ -2,6 +2,7 @@
 #include "solver.h"
 
 #include "event_search.h"
+#include "feature.h"
 #include "impact.h"
 #include "indicators.h"
 #include "minimum_gap.h"
@@ -9,25 +10,17 @@
 #include "outputs.h"
 #include "column.h"
 
+#define TAKE(type, member, many, sort, name) x->member = arena_take(saved, (size_t)(many), sizeof *x->member);
+
 static void state_layout(Solver *solver, Arena *saved, Arena *scratch) {
     State *x = &solver->state;
     Integrator *i = &solver->integrator;
     const System *s = solver->system;
-    const int nq = s->nq, nv = s->nv, contacts = s->contacts, indicators = indicators_count(s);
+    const int nq = s->nq, nv = s->nv;
     const size_t begin = saved->used;
     x->block = saved->base == NULL ? NULL : saved->base + begin;
-    x->q = arena_doubles(saved, nq);
-    x->v = arena_doubles(saved, nv);
-    x->switch_state = arena_doubles(saved, s->switches);
-    x->offset = arena_doubles(saved, s->m);
-    x->scale = arena_doubles(saved, nq + nv);
-    x->size = arena_doubles(saved, nq);
-    x->span = s->kinematics != NULL ? arena_doubles(saved, nv) : x->size;
-    x->gap = arena_doubles(saved, contacts);
-    x->basis = arena_ints(saved, s->m);
-    x->closed = arena_ints(saved, contacts);
-    x->armed = arena_ints(saved, contacts);
-    x->left = arena_ints(saved, indicators);
+    STATE_ARRAYS(TAKE)
+    if (s->kinematics == NULL) x->span = x->size;
     for (int k = 0; k < EVENT_KINDS; k++) {
         const int count = event_count_of(s, (EventKind)k);
         x->latest[k].count = arena_take(saved, (size_t)count, sizeof(Count));
@@ -35,11 +28,7 @@ static void state_layout(Solver *solver, Arena *saved, Arena *scratch) {
         x->latest[k].q = arena_doubles(saved, count * nq);
         x->latest[k].v = arena_doubles(saved, count * nv);
     }
-    x->impulse = arena_doubles(saved, contacts);
-    x->stick_slip = arena_take(saved, (size_t)s->frictions, sizeof *x->stick_slip);
-    x->indicator = arena_doubles(saved, indicators);
-    x->variation = arena_doubles(saved, solver->columns * column_size(s));
-    x->varied = arena_ints(saved, solver->columns > 0);
+    STATE_ARRAYS_BEHIND(TAKE)
     integrator_layout(i, saved, scratch, solver_width(solver), nq + nv, OPTIONAL.methods, METHOD_COUNT);
     x->block_size = saved->used - begin;
 }
@@ -55,7 +44,6 @@ void solver_layout(Solver *s, Arena *saved, Arena *scratch, const System *system
     s->drive.first = arena_doubles(saved, system->inputs);
     s->drive.second = arena_doubles(saved, system->inputs);
     s->p = arena_doubles(saved, system->parameters);
-    s->peak = arena_doubles(saved, peaks_saved(s->peaks, s->peak_columns));
     Arena none = {NULL, 0}; /* the two never step within each other */
     integrator_layout(&s->probe, scratch, &none, width, states, OPTIONAL.methods, METHOD_COUNT);
     s->probe.scratch = s->integrator.scratch;
@@ -85,11 +73,8 @@ void solver_layout(Solver *s, Arena *saved, Arena *scratch, const System *system
     s->work_pause = arena_doubles(scratch, width);
     s->work_events = arena_doubles(scratch, 3 * width + indicators +
                                                 (indicators == 0 ? 0 : event_search_doubles(indicators)));
-    if (s->peaks > 0) {
-        observed_layout(&s->peak_seen, scratch, system);
-        s->work_peaks = arena_doubles(scratch, OPTIONAL.peaks->doubles(s->peaks, width));
-        s->iwork_peaks = arena_ints(scratch, s->peak_columns > 0 ? 2 * s->peaks : 0);
-    }
+    for (int k = 0; s->features != NULL && s->features[k] != NULL; k++)
+        s->own[k] = s->features[k]->layout != NULL ? s->features[k]->layout(s, saved, scratch) : NULL;
     s->work_gap = arena_doubles(scratch, minimum_gap_doubles(system));
     if (s->columns > 0) OPTIONAL.variation->layout(s, scratch);
     if (system->joint_count > 0) OPTIONAL.joints->layout(s, scratch);

@@ -1,5 +1,7 @@
-/* optional.c -- everything: the FMU of a scene that asks for all outputs and methods. */
+/* optional.c -- a simulation with all methods and everything that it can do by itself: what runs without an FMU. */
 #include "optional.h"
+
+#include "feature.h"
 
 SHARED_VALUE const Optional OPTIONAL = {
     .methods = {[AUTO] = &dop853,
@@ -18,10 +20,11 @@ SHARED_VALUE const Optional OPTIONAL = {
     .modes_departures = modes_departures,
     .modes_contradicted = modes_contradicted,
     .switches = &SWITCHES,
-    .peaks = &PEAKS,
     .passage = &PASSAGE,
     .friction = &FRICTION_EVENTS,
     .variation = &VARIATION,
     .sliding_along = sliding_along,
     .joints = &JOINT_START,
 };
+
+SHARED_VALUE const Feature *const *const FEATURES = (const Feature *const[]){NULL};

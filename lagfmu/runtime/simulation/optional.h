@@ -12,7 +12,6 @@
 #include "switches.h"
 #include "linkage.h"
 #include "passage.h"
-#include "peaks.h"
 #include "rattle.h"
 #include "friction_events.h"
 #include "modes.h"
@@ -38,8 +37,6 @@ typedef struct {
     Status (*modes_contradicted)(Solver *s);
     /* Of forces that jump; NULL where none do. */
     const Switches *switches;
-    /* Of quantities whose extremes are kept; NULL where there are none. */
-    const Peaks *peaks;
     /* Of singular configurations; NULL with less than two constraints, or with frictions. */
     const Passage *passage;
     /* What constraints that hold by friction need; NULL where there are none. */

@@ -47,10 +47,6 @@ void saltation_layout(Solver *s, Arena *scratch) {
     x->was = arena_doubles(scratch, saltation_modes_size(system));
     x->modes = arena_doubles(scratch, saltation_modes_size(system));
     x->others = arena_doubles(scratch, saltation_modes_size(system));
-    const int peaks = s->peak_columns > 0 ? s->peaks : 0;
-    x->peak_changes = arena_doubles(scratch, peaks);
-    x->peak_rates = arena_doubles(scratch, peaks);
-    x->peak_before = arena_doubles(scratch, peaks);
 }
 
 /* ------------------------------------------------------------------ the end of the columns */

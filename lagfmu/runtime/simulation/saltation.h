@@ -18,7 +18,6 @@ struct Saltation {
     int limit;                       /* the first of those that are passed; -1: no event */
     double pace;                     /* [1/s] the motion's natural rate; quicker where a limit is passed slowly */
     double *was, *modes, *others;    /* (saltation_modes_size()) before the map, after it, and beside that */
-    double *peak_changes, *peak_rates, *peak_before; /* (peaks) of peak_changes.c */
     Why ended;
 };
 

@@ -62,15 +62,8 @@ typedef struct Solver {
     double *scale;             /* (states) of errors, in the present step */
     double *u;                 /* (inputs, then switches) at the time of the latest evaluation */
     Sensitivity sensitivity;   /* of `stepped` */
-    int peaks;                 /* how many quantities' extremes are kept (peaks.h); set before the layout */
-    Status (*measure)(struct Solver *s, const Observed *o, double *values); /* (peaks) of them at a state */
-    double *peak;              /* what is kept of them, saved behind the state's arrays */
-    int peak_columns;          /* 0, or `columns`: their extremes are differentiated; set before the layout */
-    /* (peaks) Their changes at the state of now: along column c; -1: with time, along the motion. */
-    Status (*measure_change)(struct Solver *s, int c, double *changes);
-    /* The name of part `part` of quantity k, if its derivative by column c is asked for; else NULL. */
-    const char *(*peak_asked)(int c, int k, int part);
-    int *iwork_peaks;          /* (2 peaks) of peaks.c */
+    const struct Feature *const *features; /* feature.h; NULL: a run with nothing but the motion.  Set before the layout */
+    void *own[8];              /* what each keeps (FEATURES_MOST) */
     int columns;               /* how many columns of derivatives go with the state (variation.h), and ... */
     const Column *column;      /* (columns) ... by what; both are set before the layout */
     struct Saltation *saltation; /* of saltation.c; NULL without columns */
@@ -89,8 +82,6 @@ typedef struct Solver {
     double *work_pause;        /* (solver_width()) */
     double *work_events;       /* (3 solver_width() + indicators and all samples) of events.c and exchange_gain.c */
     double *work_gap;    /* of minimum_gap.c */
-    Observed peak_seen;        /* of peaks.c, with */
-    double *work_peaks;
     double *work_frictional;   /* of frictional_impact.c */
     int *iwork_frictional;
     StickSlip *trial_modes;    /* (frictions) of stick_slip.c, with */

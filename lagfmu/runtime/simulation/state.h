@@ -18,9 +18,14 @@ SHARED const char *const METHOD_NAMES[METHOD_COUNT];
 /* How to step.  tolerance: relative, a step; step [s]: largest step of rk4 and rattle, 0: chosen;
  * maximum_step [s]: largest adaptive step, 0: no limit.  maximum_steps: how many steps shorter than 1e-6
  * of the natural time a communication step may take, 0: no limit. */
+#define SETTINGS_NUMBERS(N)                           \
+    N(double, tolerance, SIZE, "solver.tolerance")    \
+    N(double, step, SIZE, "solver.step")              \
+    N(double, maximum_step, SIZE, "solver.maximum_step") \
+    N(double, maximum_steps, SIZE, "solver.maximum_steps")
 typedef struct {
     MethodName method;
-    double tolerance, step, maximum_step, maximum_steps;
+    SETTINGS_NUMBERS(SAVED_MEMBER)
 } Settings;
 
 /* Inputs as polynomials in the time since they were set: u_k(elapsed) = value + elapsed * first +
@@ -41,35 +46,48 @@ typedef long long Count;
 
 enum { APART_UNKNOWN = 2 }; /* before the first step */
 
-/* How a singular configuration is approached (passage.h): the time [s] of the latest step's beginning, how far the
- * rows were apart there (sine of an angle; negative: such a configuration has been passed since), whether
- * one is near, and in how many seconds (negative: behind). */
+/* How a singular configuration is approached (passage.h). */
+#define APPROACH "approach to a singular configuration"
+#define APPROACH_NUMBERS(N)                                                                                          \
+    N(double, t, FINITE, APPROACH)     /* [s] the latest step's beginning */                                         \
+    N(double, apart, FINITE, APPROACH) /* sine of the angle between the rows there; negative: such a configuration has \
+                                        * been passed since */                                                       \
+    N(double, until, FINITE, APPROACH) /* [s] in how many seconds one comes; negative: behind */                     \
+    N(int, near, FLAG, APPROACH)       /* 1: one is near */
 typedef struct {
-    double t, apart, until;
-    int near;
+    APPROACH_NUMBERS(SAVED_MEMBER)
 } Approach;
 
-/* The numbers of a state (copied as a struct) ... */
+/* The numbers (copied as a struct), as in saved.h. */
+#define STATE_NUMBERS(N)                                                                                             \
+    N(double, t, FINITE, "time")                              /* [s] the communication point */                      \
+    N(double, rate, LIMIT, "natural rate")                    /* [1/s] of the motion at the start */                 \
+    N(int, dependent, FLAG, "rank of the constraints")        /* 1: at the latest state on the constraints rows that act
+                                                               * depended on each other */                           \
+    N(double, step, LIMIT, "step")                            /* [s] the step to try next */                         \
+    N(double, span, SIZE, "communication step")               /* [s] the one that led to t; 0: none */               \
+    N(Count, steps, TALLY, "step count")                      /* internal steps taken so far */                      \
+    N(Count, tiny, TALLY, "step count")                       /* of the present one, those that make no headway */   \
+    N(int, ahead, FLAG, "mode of the step ahead")             /* 1: the integrator stands at t_integrator >= t, and dense
+                                                               * output answers */                                   \
+    N(int, between, FLAG, "mode of the step ahead")           /* 1: q and v are still to be found: solver_arrive() */ \
+    N(double, event_time, FINITE, "time of the event")        /* [s] found in the step ahead; only if event_count > 0 */ \
+    N(int, event_count, COUNT, "count of events")             /* indicators that leave their ranges then */          \
+    N(int, pending, FLAG, "event that is reached")            /* 1: its modes are those before it: solver_meet() */  \
+    N(double, t_old, FINITE, "integrator's time")             /* of the integrator, when it is ahead, ... */         \
+    N(double, t_integrator, FINITE, "integrator's time")                                                             \
+    N(double, h_next, LIMIT, "next step")                                                                            \
+    N(double, error_old, LIMIT, "error of the step")                                                                 \
+    N(int, fresh, FLAG, "mode of the step ahead")             /* ... as far as here */                               \
+    N(double, lost, FINITE, "energy dissipated")              /* [J] by frictions and impacts, ... */                \
+    N(double, lost_old, FINITE, "energy dissipated")          /* ... so far where the integrator began its step, ... */ \
+    N(double, lost_ahead, FINITE, "energy dissipated")        /* ... and stands */                                   \
+    N(double, estimated, SIZE, "estimated error")             /* the largest of a step so far, relative */
+
 typedef struct {
-    double t;            /* [s] the communication point */
-    double rate;         /* [1/s] the motion's natural rate at the start */
-    int dependent;       /* 1: at the latest state on the constraints, rows that act depended on each other */
+    STATE_NUMBERS(SAVED_MEMBER)
     Approach approach;   /* to a singular configuration */
-    double step;         /* [s] the step to try next */
-    double span;         /* [s] the communication step that led to t; 0: none */
-    Count steps;         /* internal steps taken so far */
-    Count tiny;          /* those of the present communication step that make no headway */
-    int ahead;           /* 1: the integrator stands at integrator->t >= t, and dense output answers */
-    int between;         /* 1: q and v are still to be taken from dense output at t: solver_arrive() */
-    double event_time;   /* [s] of the event found in the step ahead; only if event_count > 0 */
-    int event_count;     /* indicators that leave their ranges then */
-    int pending;         /* 1: at t an event has been reached, and its modes are still those before it: solver_meet() */
-    double t_old, t_integrator, h_next, error_old; /* of the integrator, when it is ahead */
-    int fresh;
     Choice choice;       /* of the method `auto` */
-    double lost;         /* [J] that frictions and impacts have dissipated, ... */
-    double lost_old, lost_ahead; /* ... and so far where the integrator began its step, and stands */
-    double estimated;    /* the largest estimated relative error of a step so far, by the tolerance */
 } Numbers;
 
 /* What happens again and again: to a contact, which opens and is closed or struck, and to a friction, which
@@ -81,34 +99,59 @@ typedef struct {
     double *q, *v;  /* (nq), (nv) of each */
 } Latest;
 
-/* ... and its arrays, which lie in one block. */
-typedef struct {
-    Numbers now;
-    int looking;              /* 1: events are not counted: solver_look(), after which a saved state is put back */
-    double *q, *v;            /* (nq), (nv) at t, on the constraints */
-    double *switch_state;     /* (switches) on which side of its surface each force that jumps is evaluated */
-    double *offset;           /* (m) f = offset of a row which came back with its contact */
-    double *scale;            /* (states) magnitudes below which errors in q and v are measured absolutely */
-    double *size;             /* (nq) the coordinates' magnitudes, for rounding */
-    double *span;             /* (nv) those of what each speed moves */
-    double *gap;              /* (contacts) |f| below which a contact touches */
-    int *basis;               /* (m) rows that act, as many of them as were independent there */
-    int *closed, *armed;      /* (contacts) */
-    int *left;                /* (indicators) its range at the event ahead: 1 upwards, -1 downwards */
-    Latest latest[EVENT_KINDS]; /* of each contact, or friction */
-    double *impulse;          /* (contacts) [of lambda times s] of the latest closing; 0: none */
-    StickSlip *stick_slip;    /* (frictions) how they stand */
-    double *variation;        /* (columns * column_size()) derivatives of all that is differentiable here */
-    int *varied;              /* one, where there are columns: 1 while they exist */
-    double *indicator;        /* (indicators) their values at the integrator's time, when it is ahead */
-    char *block;              /* all of the arrays above */
-    size_t block_size;
-} State;
-
 /* How many there are to which events of a kind happen: contacts, or frictions. */
 static inline int event_count_of(const System *s, EventKind kind) {
     return kind <= CLOSING ? s->contacts : s->frictions;
 }
+
+/* The event indicators (indicators.h): the number of the first of a friction, and how many are watched. */
+static inline int indicators_first_of_frictions(const System *s) { return s->contacts + s->switches; }
+static inline int indicators_count(const System *s) { return s->contacts + s->switches + 2 * s->frictions; }
+
+/* A column of a run's derivatives holds those of what is remembered: y; of each event time, q, v; impulses;
+ * offsets; the energy dissipated. */
+static inline int column_of_event(const System *s, EventKind kind, int i) {
+    int at = system_states(s);
+    for (int k = 0; k < (int)kind; k++) at += event_count_of(s, (EventKind)k) * (1 + system_states(s));
+    return at + i * (1 + system_states(s));
+}
+static inline int column_of_impulse(const System *s, int c) { return column_of_event(s, EVENT_KINDS, 0) + c; }
+static inline int column_of_offset(const System *s, int k) { return column_of_impulse(s, s->contacts) + k; }
+static inline int column_of_loss(const System *s) { return column_of_offset(s, s->m); }
+static inline int column_size(const System *s) { return column_of_loss(s) + 1; }
+
+/* The arrays, which lie in one block; how many: of System *s, Solver *solver. */
+#define STATE_ARRAYS(A)                                                                                              \
+    A(double, q, s->nq, FINITE, "coordinates")                /* at t, on the constraints */                         \
+    A(double, v, s->nv, FINITE, "velocities")                                                                        \
+    A(double, switch_state, s->switches, FINITE, "switch states") /* on which side of its surface each force that jumps
+                                                               * is evaluated */                                     \
+    A(double, offset, s->m, FINITE, "offsets")                /* f = offset of a row which came back with its contact */ \
+    A(double, scale, s->nq + s->nv, SIZE, "scales")           /* below which errors in q and v are measured absolutely */ \
+    A(double, size, s->nq, SIZE, "sizes")                     /* the coordinates' magnitudes, for rounding */        \
+    A(double, span, s->kinematics != NULL ? s->nv : 0, SIZE, "sizes") /* those of what each speed moves; no array: size */ \
+    A(double, gap, s->contacts, SIZE, "gaps")                 /* |f| below which a contact touches */                \
+    A(int, basis, s->m, FLAG, "rank of the constraints")      /* rows that act, as many as were independent there */ \
+    A(int, closed, s->contacts, FLAG, "modes")                                                                       \
+    A(int, armed, s->contacts, FLAG, "modes")                                                                        \
+    A(int, left, indicators_count(s), OTHER, "events")        /* its range at the event ahead: 1 upwards, -1 downwards */
+
+#define STATE_ARRAYS_BEHIND(A)                                                                                       \
+    A(double, impulse, s->contacts, SIZE, "impulses")         /* [of lambda times s] of the latest closing; 0: none */ \
+    A(StickSlip, stick_slip, s->frictions, OTHER, "modes")    /* how they stand: friction_modes() */                 \
+    A(double, indicator, indicators_count(s), FINITE, "indicators") /* at the integrator's time, when it is ahead */ \
+    A(double, variation, solver->columns * column_size(s), FINITE, "derivatives of the run")                         \
+    A(int, varied, solver->columns > 0, FLAG, "derivatives of the run") /* one, where there are columns: they exist */
+
+typedef struct {
+    Numbers now;
+    int looking;              /* 1: events are not counted: solver_look(), after which a saved state is put back */
+    STATE_ARRAYS(SAVED_POINTER)
+    Latest latest[EVENT_KINDS]; /* of each contact, or friction */
+    STATE_ARRAYS_BEHIND(SAVED_POINTER)
+    char *block;              /* all of the arrays above */
+    size_t block_size;
+} State;
 
 /* y (states) of q and v, and back. */
 SHARED void state_gather(const System *s, const double *q, const double *v, double *y);

@@ -102,5 +102,4 @@ static Status variation_project(Solver *s, Instant at, double *y) {
 }
 
 SHARED_VALUE const Variation VARIATION = {saltation_layout, variation_rates, variation_project, saltation_start,
-                                          saltation_pass,   saltation_jump,  unwatched_look,    saltation_ended,
-                                          vary_peaks,       peak_rates_before};
+                                          saltation_pass,   saltation_jump,  unwatched_look,    saltation_ended};

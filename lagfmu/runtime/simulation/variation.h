@@ -18,10 +18,6 @@
  * stand there.  A start moves the start value of column c, if it is one, by `part`. */
 typedef Status (*Map)(Solver *s, void *context, int c, double part);
 
-/* Where a record lies: at a given time; at the event of now, behind it or before; an extreme inside of the motion; one
- * more that is the same to the tolerance; where the motion has gone on from, or began. */
-typedef enum { PEAK_GIVEN, PEAK_EVENT, PEAK_BEFORE, PEAK_INSIDE, PEAK_AGAIN, PEAK_LEFT, PEAK_START } PeakKind;
-
 typedef struct {
     void (*layout)(Solver *s, Arena *scratch);
     /* Rates of the columns at y (solver_width()), of the latest motion. */
@@ -37,11 +33,6 @@ typedef struct {
     void (*look)(Solver *s);
     /* Why the columns ended, since it was last asked; empty where they did not. */
     const char *(*ended)(Solver *s, Why *text);
-    /* peak_changes.c: changes of the records `which` (2 peaks: largest and smallest of each) at the state of now, whose
-     * columns are those of now; PEAK_LEFT, PEAK_START: next to the place of such an extreme by `near` [s].  The state
-     * stays.  `before`: rates of all quantities just before an event. */
-    void (*peaks)(Solver *s, const int *which, PeakKind kind, double near);
-    void (*peaks_before)(Solver *s);
 } Variation;
 
 SHARED const Variation VARIATION;
@@ -56,9 +47,5 @@ SHARED const char *saltation_ended(Solver *s, Why *text);
 
 /* unwatched.c */
 SHARED void unwatched_look(Solver *s);
-
-/* peak_changes.c */
-SHARED void vary_peaks(Solver *s, const int *which, PeakKind kind, double near);
-SHARED void peak_rates_before(Solver *s);
 
 #endif

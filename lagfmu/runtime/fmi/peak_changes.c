@@ -13,6 +13,7 @@
 
 #include <math.h>
 
+#include "derivatives.h"
 #include "digits.h"
 #include "peaks.h"
 #include "segment.h"
@@ -28,6 +29,31 @@ typedef struct {
     int flat;
 } Top;
 
+/* The name of that part of quantity k, if its derivative by column c is asked for; else NULL. */
+static const char *asked(int c, int k, PeakPart part) {
+    for (int j = 0; j < VARIABLE_COUNT; j++) {
+        const Variable *of = derivatives_of(j);
+        if (of != NULL && VARIABLES[j].contact == c && of->index == k && of->place == (Place)(AT_PEAK_MAX + part))
+            return of->name;
+    }
+    return NULL;
+}
+
+/* Changes (PEAK_COUNT) of the quantities whose extremes are kept, along a column or, -1, the motion. */
+static Status change_of_peaked(Solver *s, int c, double *changes) {
+    Instance *x = s->caller;
+    Direction d;
+    x->seen.asked = 1;
+    if (solver_observe(s, &x->seen) != OK) return FAILED;
+    x->observed = 1; /* of this state, until it has been differentiated */
+    Status status = c < 0 ? instance_rates(x, &d) : instance_factor(x);
+    if (c >= 0 && status == OK) status = derivatives_along(x, c, &d);
+    for (int k = 0; k < PEAK_COUNT && status == OK; k++)
+        if (instance_change(x, &PEAKED[k], d, &changes[k]) != OK) changes[k] = 0;
+    x->observed = x->evaluated = 0;
+    return status;
+}
+
 /* Extremes in a row: of quantity i/2 the largest, then the smallest. */
 static double sense_of(int i) { return i % 2 == 0 ? 1 : -1; }
 static PeakPart part_of(double sense) { return sense > 0 ? PEAK_MAX : PEAK_MIN; }
@@ -35,13 +61,13 @@ static PeakPart time_of(double sense) { return sense > 0 ? PEAK_MAX_TIME : PEAK_
 
 /* By any column: is the extreme's derivative asked for, or that of its time? */
 static int is_asked(const Solver *s, int k, PeakPart part) {
-    for (int c = 0; c < s->peak_columns; c++)
-        if (s->peak_asked(c, k, (int)part) != NULL) return 1;
+    for (int c = 0; c < peaks_of(s)->columns; c++)
+        if (asked(c, k, part) != NULL) return 1;
     return 0;
 }
 
 static Status none_of_peak(Solver *s, int c, int k, const Top *top, int of_time, const char *why) {
-    const char *name = s->peak_asked(c, k, (int)(of_time ? time_of(top->sense) : part_of(top->sense)));
+    const char *name = asked(c, k, of_time ? time_of(top->sense) : part_of(top->sense));
     return fail(&s->why, "%s at t = %s s: %s", name, digits(top->t).text, why);
 }
 
@@ -63,9 +89,9 @@ static Status change_of_rate(Solver *s, int k, int c, double dt, double *change,
         segment_begin(s);
         status = mechanism_project(&s->stepped, segment_instant(s, s->state.now.t), s->state.q, s->state.v, s->active,
                                    s->state.offset, s->state.span);
-        if (status == OK) status = s->measure_change(s, -1, x->peak_changes);
+        if (status == OK) status = change_of_peaked(s, -1, peaks_of(s)->changes);
         if (parameter >= 0) s->p[parameter] = held;
-        rate[r] = x->peak_changes[k];
+        rate[r] = peaks_of(s)->changes[k];
     }
     saltation_scatter(s, x->from);
     s->state.now.t = t;
@@ -82,10 +108,10 @@ static Status find_top(Solver *s, int k, Top *top, int *kink) {
     const int n = system_states(s->system);
     saltation_gather(s, x->from);
     x->pace = s->state.now.rate > 0 ? s->state.now.rate : 1;
-    if (solver_observe(s, &s->peak_seen) != OK || s->measure(s, &s->peak_seen, x->peak_changes) != OK) return FAILED;
-    top->value = x->peak_changes[k];
-    if (s->measure_change(s, -1, x->peak_changes) != OK) return FAILED;
-    top->rate = x->peak_changes[k];
+    if (solver_observe(s, &peaks_of(s)->seen) != OK || peaks_measure(s, &peaks_of(s)->seen, peaks_of(s)->changes) != OK) return FAILED;
+    top->value = peaks_of(s)->changes[k];
+    if (change_of_peaked(s, -1, peaks_of(s)->changes) != OK) return FAILED;
+    top->rate = peaks_of(s)->changes[k];
     memset(x->direction, 0, (size_t)column_size(s->system) * sizeof *x->direction);
     if (saltation_flow(s, s->state.now.t, x->from, x->flow_before) != OK) return FAILED;
     memcpy(x->direction, x->flow_before, (size_t)n * sizeof *x->direction);
@@ -109,9 +135,9 @@ static Status time_inside(Solver *s, int k, int c, const Top *top, double *later
 
 /* Two extremes that are the same to the tolerance: another number would make either the greater. */
 static int same_change(const Solver *s, int c, int k, double sense, double change) {
-    const double *record = peak_record(s, k);
+    const double *record = peak_record(peaks_of(s), k);
     const double size = saltation_size(s, s->column[c].parameter);
-    const double before = peak_change(s, c, k)[part_of(sense)];
+    const double before = peak_change(peaks_of(s), c, k)[part_of(sense)];
     const double most = fmax(fmax(fabs(change), fabs(before)), fabs(record[part_of(sense)]) / size);
     return fabs(change - before) <= sqrt(s->settings.tolerance) * most;
 }
@@ -119,19 +145,18 @@ static int same_change(const Solver *s, int c, int k, double sense, double chang
 /* An extreme of quantity k inside of a smooth motion, at the state of now: the record's changes, or, `again`, are they
  * those of the record? */
 static Status vary_inside(Solver *s, int k, double sense, int again) {
-    struct Saltation *x = s->saltation;
     Top top = {.t = s->state.now.t, .sense = sense};
     int kink;
     if (find_top(s, k, &top, &kink) != OK) return FAILED;
-    for (int c = 0; c < s->peak_columns; c++) {
-        const int of_time = s->peak_asked(c, k, (int)time_of(sense)) != NULL;
-        const int of_value = s->peak_asked(c, k, (int)part_of(sense)) != NULL;
-        double later, *kept = peak_change(s, c, k);
+    for (int c = 0; c < peaks_of(s)->columns; c++) {
+        const int of_time = asked(c, k, time_of(sense)) != NULL;
+        const int of_value = asked(c, k, part_of(sense)) != NULL;
+        double later, *kept = peak_change(peaks_of(s), c, k);
         if (!of_time && !of_value) continue;
         if (kink && !top.flat) return none_of_peak(s, c, k, &top, !of_value, "the motion has a kink there");
         if (top.flat && of_time) return none_of_peak(s, c, k, &top, 1, "it is flat, and may be anywhere");
-        if (time_inside(s, k, c, &top, &later) != OK || s->measure_change(s, c, x->peak_changes) != OK) return FAILED;
-        const double change = x->peak_changes[k] + top.rate * later;
+        if (time_inside(s, k, c, &top, &later) != OK || change_of_peaked(s, c, peaks_of(s)->changes) != OK) return FAILED;
+        const double change = peaks_of(s)->changes[k] + top.rate * later;
         if (again && !same_change(s, c, k, sense, change))
             return none_of_peak(s, c, k, &top, !of_value,
                                 "it is as large as one before, and another number changes them differently");
@@ -149,10 +174,10 @@ static Status vary_left(Solver *s, int k, double sense, double near, int begun) 
     if (find_top(s, k, &top, &kink) != OK) return FAILED;
     if (top.flat || kink || fabs(top.rate) > near * fabs(top.bend)) return OK;
     if (!begun) return vary_inside(s, k, sense, 0);
-    for (int c = 0; c < s->peak_columns; c++) {
+    for (int c = 0; c < peaks_of(s)->columns; c++) {
         const double size = saltation_size(s, s->column[c].parameter);
         double later;
-        if (s->peak_asked(c, k, (int)time_of(sense)) == NULL) continue;
+        if (asked(c, k, time_of(sense)) == NULL) continue;
         if (time_inside(s, k, c, &top, &later) != OK) return FAILED;
         if (fabs(later) * size * s->saltation->pace > STAYS)
             return none_of_peak(s, c, k, &top, 1, "it is the start, and would come later with a little more or less of a number");
@@ -163,15 +188,15 @@ static Status vary_left(Solver *s, int k, double sense, double near, int begun) 
 /* At a given time, or at the time of an event. */
 static Status vary_here(Solver *s, const int *which, int at_event) {
     struct Saltation *x = s->saltation;
-    if (at_event && s->measure_change(s, -1, x->peak_rates) != OK) return FAILED;
-    for (int c = 0; c < s->peak_columns; c++) {
-        if (s->measure_change(s, c, x->peak_changes) != OK) return FAILED;
-        for (int i = 0; i < 2 * s->peaks; i++) {
+    if (at_event && change_of_peaked(s, -1, peaks_of(s)->rates) != OK) return FAILED;
+    for (int c = 0; c < peaks_of(s)->columns; c++) {
+        if (change_of_peaked(s, c, peaks_of(s)->changes) != OK) return FAILED;
+        for (int i = 0; i < 2 * PEAK_COUNT; i++) {
             const int k = i / 2;
             const double later = at_event ? x->dt[c] : 0;
             if (!which[i]) continue;
-            double *kept = peak_change(s, c, k);
-            kept[part_of(sense_of(i))] = x->peak_changes[k] + (at_event ? x->peak_rates[k] * later : 0);
+            double *kept = peak_change(peaks_of(s), c, k);
+            kept[part_of(sense_of(i))] = peaks_of(s)->changes[k] + (at_event ? peaks_of(s)->rates[k] * later : 0);
             kept[time_of(sense_of(i))] = later;
         }
     }
@@ -181,11 +206,11 @@ static Status vary_here(Solver *s, const int *which, int at_event) {
 /* A record before an event, at its time: it goes with the event. */
 static void vary_before(Solver *s, const int *which) {
     struct Saltation *x = s->saltation;
-    for (int c = 0; c < s->peak_columns; c++)
-        for (int i = 0; i < 2 * s->peaks; i++) {
+    for (int c = 0; c < peaks_of(s)->columns; c++)
+        for (int i = 0; i < 2 * PEAK_COUNT; i++) {
             if (!which[i]) continue;
-            double *kept = peak_change(s, c, i / 2);
-            kept[part_of(sense_of(i))] += x->peak_before[i / 2] * x->dt[c];
+            double *kept = peak_change(peaks_of(s), c, i / 2);
+            kept[part_of(sense_of(i))] += peaks_of(s)->before[i / 2] * x->dt[c];
             kept[time_of(sense_of(i))] = x->dt[c];
         }
 }
@@ -193,10 +218,10 @@ static void vary_before(Solver *s, const int *which) {
 static Status vary_by_kind(Solver *s, const int *which, PeakKind kind, double near) {
     int any = 0;
     if (kind == PEAK_GIVEN || kind == PEAK_EVENT) {
-        for (int i = 0; i < 2 * s->peaks; i++) any |= which[i];
+        for (int i = 0; i < 2 * PEAK_COUNT; i++) any |= which[i];
         return any ? vary_here(s, which, kind == PEAK_EVENT) : OK;
     }
-    for (int i = 0; i < 2 * s->peaks; i++) {
+    for (int i = 0; i < 2 * PEAK_COUNT; i++) {
         const int k = i / 2;
         const double sense = sense_of(i);
         if (!which[i] || !(is_asked(s, k, part_of(sense)) || is_asked(s, k, time_of(sense)))) continue;
@@ -207,16 +232,18 @@ static Status vary_by_kind(Solver *s, const int *which, PeakKind kind, double ne
     return OK;
 }
 
-void vary_peaks(Solver *s, const int *which, PeakKind kind, double near) {
-    if (s->peak_columns == 0 || !*s->state.varied) return;
+static void vary_peaks(Solver *s, const int *which, PeakKind kind, double near) {
+    if (peaks_of(s)->columns == 0 || !*s->state.varied) return;
     if (kind == PEAK_BEFORE)
         vary_before(s, which);
     else if (vary_by_kind(s, which, kind, near) != OK)
         saltation_end(s);
 }
 
-void peak_rates_before(Solver *s) {
-    if (s->peak_columns == 0 || !*s->state.varied) return;
+static void peak_rates_before(Solver *s) {
+    if (peaks_of(s)->columns == 0 || !*s->state.varied) return;
     segment_begin(s);
-    if (s->measure_change(s, -1, s->saltation->peak_before) != OK) saltation_end(s);
+    if (change_of_peaked(s, -1, peaks_of(s)->before) != OK) saltation_end(s);
 }
+
+SHARED_VALUE const PeakChanges PEAK_CHANGES = {vary_peaks, peak_rates_before};

@@ -13,7 +13,7 @@
 #include <string.h>
 
 #include "extreme.h"
-#include "optional.h"
+#include "derivatives.h"
 #include "column.h"
 #include "segment.h"
 
@@ -39,14 +39,19 @@ typedef struct {
     double *before;           /* (PEAK_PARTS peaks) the records as they were */
 } Stretch;
 
-static int doubles_of_peaks(int peaks, int states) { return (PIECES + 2 + PEAK_PARTS) * (1 + peaks) + 2 * states; }
+static double *reached(const Peaks *x) { return x->kept + peaks_saved(PEAK_COUNT, x->columns) - 1; }
 
-static double *reached(const Solver *s) { return s->peak + peaks_saved(s->peaks, s->peak_columns) - 1; }
+/* The quantities whose extremes are kept, at a state. */
+Status peaks_measure(Solver *s, const Observed *o, double *values) {
+    for (int k = 0; k < PEAK_COUNT; k++)
+        if (instance_value(s, o, &PEAKED[k], &values[k]) != OK) return FAILED;
+    return OK;
+}
 
 /* Everything that is kept, at the state of now. */
 static Status measure_peak(Solver *s, double *values) {
-    if (solver_observe(s, &s->peak_seen) != OK) return FAILED;
-    return s->measure(s, &s->peak_seen, values);
+    Observed *seen = &peaks_of(s)->seen;
+    return solver_observe(s, seen) == OK ? peaks_measure(s, seen, values) : FAILED;
 }
 
 /* The same at (t, y); the state of now is lost. */
@@ -79,12 +84,12 @@ static Status height_of_peak(void *context, double elapsed, double *value) {
     return OK;
 }
 
-static double at(const Stretch *x, int j) { return x->sense * x->values[j * x->s->peaks + x->quantity]; }
+static double at(const Stretch *x, int j) { return x->sense * x->values[j * PEAK_COUNT + x->quantity]; }
 
 /* Of extremes that are the same to the tolerance the first one's time stays; one that is on the way up, before
  * which nothing lies but what has counted since `begin`, goes along. */
 static int keep_peaks(Solver *s, int k, double sense, double begin, double t, double height) {
-    double *kept = s->peak + PEAK_PARTS * k;
+    double *kept = peaks_of(s)->kept + PEAK_PARTS * k;
     const int way = sense > 0 ? PEAK_MAX : PEAK_MIN, when = sense > 0 ? PEAK_MAX_TIME : PEAK_MIN_TIME;
     const double more = height - sense * kept[way];
     if (!(more > 0)) return 0;
@@ -94,7 +99,7 @@ static int keep_peaks(Solver *s, int k, double sense, double begin, double t, do
 }
 
 static double record_of(const Stretch *x) {
-    const double *kept = x->s->peak + PEAK_PARTS * x->quantity;
+    const double *kept = peaks_of(x->s)->kept + PEAK_PARTS * x->quantity;
     return x->sense * kept[x->sense > 0 ? PEAK_MAX : PEAK_MIN];
 }
 
@@ -109,29 +114,29 @@ static void find(Stretch *x, double t, double height) {
 /* ------------------------------------------------------------------ their derivatives */
 
 /* 1: the extremes are differentiated. */
-static int is_varied(const Stretch *x) { return x->s->peak_columns > 0 && !x->exchange && *x->s->state.varied; }
+static int is_varied(const Stretch *x) { return peaks_of(x->s)->columns > 0 && !x->exchange && *x->s->state.varied; }
 
 static double record_time(const Solver *s, int k, double sense) {
-    return peak_record(s, k)[sense > 0 ? PEAK_MAX_TIME : PEAK_MIN_TIME];
+    return peak_record(peaks_of(s), k)[sense > 0 ? PEAK_MAX_TIME : PEAK_MIN_TIME];
 }
 
 static double *standing_of(const Solver *s, int k, double sense) {
-    return peak_standing(s, k, sense > 0 ? PEAK_MAX : PEAK_MIN);
+    return peak_standing(peaks_of(s), k, sense > 0 ? PEAK_MAX : PEAK_MIN);
 }
 
-/* Changes of the records in s->iwork_peaks, at (t, y) of the stretch. */
+/* Changes of the records in peaks_of(s)->which, at (t, y) of the stretch. */
 static void vary_at(Solver *s, double t, const double *y, PeakKind kind, double near) {
     state_scatter(s->system, y, s->state.q, s->state.v);
     columns_scatter(s, y);
     s->state.now.t = t;
-    OPTIONAL.variation->peaks(s, s->iwork_peaks, kind, near);
+    peaks_of(s)->vary->vary(s, peaks_of(s)->which, kind, near);
 }
 
 /* Of the quantity's record alone. */
 static void vary_one(Stretch *x, double t, const double *y, PeakKind kind) {
     Solver *s = x->s;
-    memset(s->iwork_peaks, 0, (size_t)(2 * s->peaks) * sizeof *s->iwork_peaks);
-    s->iwork_peaks[2 * x->quantity + (x->sense < 0)] = 1;
+    memset(peaks_of(s)->which, 0, (size_t)(2 * PEAK_COUNT) * sizeof *peaks_of(s)->which);
+    peaks_of(s)->which[2 * x->quantity + (x->sense < 0)] = 1;
     vary_at(s, t, y, kind, STATIONARY * (x->t[1] - x->t[0]));
 }
 
@@ -168,12 +173,12 @@ static Status vary_end(Stretch *x) {
     Solver *s = x->s;
     const double t = x->t[x->count - 1];
     int any = 0;
-    for (int k = 0; k < s->peaks; k++)
+    for (int k = 0; k < PEAK_COUNT; k++)
         for (int side = 0; side < 2; side++) {
             const double sense = side == 0 ? 1 : -1;
             const int open = record_time(s, k, sense) == t;
             if (open) *standing_of(s, k, sense) = PEAK_OPEN;
-            any |= s->iwork_peaks[2 * k + side] = open;
+            any |= peaks_of(s)->which[2 * k + side] = open;
         }
     if (!any) return OK;
     const double *y = state_at(x, t);
@@ -183,7 +188,7 @@ static Status vary_end(Stretch *x) {
 }
 
 static Status vary_ends(Stretch *x) {
-    for (x->quantity = 0; x->quantity < x->s->peaks; x->quantity++)
+    for (x->quantity = 0; x->quantity < PEAK_COUNT; x->quantity++)
         for (x->sense = 1; x->sense >= -1; x->sense -= 2)
             if (vary_begin(x) != OK) return FAILED;
     return vary_end(x);
@@ -192,17 +197,17 @@ static Status vary_ends(Stretch *x) {
 /* Of the records at the state of now: at the start, or at an event, which those before it go with. */
 static void vary_records_here(Solver *s, int first) {
     const double t = s->state.now.t;
-    int *which = s->iwork_peaks;
-    if (s->peak_columns == 0 || !*s->state.varied) return;
-    OPTIONAL.variation->peaks(s, which, first ? PEAK_GIVEN : PEAK_EVENT, 0);
-    for (int k = 0; k < s->peaks; k++)
+    int *which = peaks_of(s)->which;
+    if (peaks_of(s)->columns == 0 || !*s->state.varied) return;
+    peaks_of(s)->vary->vary(s, which, first ? PEAK_GIVEN : PEAK_EVENT, 0);
+    for (int k = 0; k < PEAK_COUNT; k++)
         for (int side = 0; side < 2; side++) {
             const double sense = side == 0 ? 1 : -1;
             double *standing = standing_of(s, k, sense);
             which[2 * k + side] = !which[2 * k + side] && *standing == PEAK_OPEN && record_time(s, k, sense) == t;
             if (first || record_time(s, k, sense) == t) *standing = first ? PEAK_BEGUN : PEAK_SETTLED;
         }
-    if (!first) OPTIONAL.variation->peaks(s, which, PEAK_BEFORE, 0);
+    if (!first) peaks_of(s)->vary->vary(s, which, PEAK_BEFORE, 0);
 }
 
 /* ------------------------------------------------------------------ on a stretch */
@@ -262,17 +267,17 @@ static Status look_on_stretch(Stretch *x) {
 
 static Status look_at_all(Stretch *x, double t) {
     Solver *s = x->s;
-    const double begin = *reached(s), step = s->integrator.t - s->integrator.t_old;
+    const double begin = *reached(peaks_of(s)), step = s->integrator.t - s->integrator.t_old;
     const int pieces = (int)fmin(fmax(ceil(PIECES * (t - begin) / step), 2), PIECES);
     x->count = pieces + 1;
     for (int j = 0; j <= pieces; j++) x->t[j] = j == pieces ? t : begin + (t - begin) * j / pieces;
-    memcpy(x->before, s->peak, (size_t)(PEAK_PARTS * s->peaks) * sizeof *x->before);
+    memcpy(x->before, peaks_of(s)->kept, (size_t)(PEAK_PARTS * PEAK_COUNT) * sizeof *x->before);
     for (int j = 0; j <= pieces; j++)
-        if (measure_at(x, x->t[j], x->values + j * s->peaks) != OK) return FAILED;
-    for (x->quantity = 0; x->quantity < s->peaks; x->quantity++)
+        if (measure_at(x, x->t[j], x->values + j * PEAK_COUNT) != OK) return FAILED;
+    for (x->quantity = 0; x->quantity < PEAK_COUNT; x->quantity++)
         for (x->sense = 1; x->sense >= -1; x->sense -= 2)
             if (look_on_stretch(x) != OK) return FAILED;
-    *reached(s) = t;
+    *reached(peaks_of(s)) = t;
     return is_varied(x) ? vary_ends(x) : OK;
 }
 
@@ -280,10 +285,10 @@ static Status look_at_all(Stretch *x, double t) {
 static Status look_at_time(Stretch *x, double t) {
     Solver *s = x->s;
     const double now = s->state.now.t;
-    x->t = s->work_peaks;
+    x->t = peaks_of(s)->work;
     x->values = x->t + PIECES + 1;
-    x->value = x->values + (PIECES + 1) * s->peaks;
-    x->y = x->value + s->peaks;
+    x->value = x->values + (PIECES + 1) * PEAK_COUNT;
+    x->y = x->value + PEAK_COUNT;
     double *held = x->y + s->integrator.ny;
     x->before = held + s->integrator.ny;
     state_gather(s->system, s->state.q, s->state.v, held);
@@ -297,7 +302,7 @@ static Status look_at_time(Stretch *x, double t) {
 
 static Status pass(Solver *s, double t, const double *end) {
     Stretch x = {.s = s, .end = end};
-    if (!(t > *reached(s))) return OK;
+    if (!(t > *reached(peaks_of(s)))) return OK;
     x.dense = s->integrator.method->dense;
     return look_at_time(&x, t);
 }
@@ -327,8 +332,8 @@ static Status step(Solver *s, int *event) {
     if (!(s->state.now.t > begin)) return OK;
     memcpy(i->y_old, i->y, bytes);
     memcpy(i->f_old, i->f, bytes);
-    i->t_old = s->state.now.t_old = *reached(s) = begin;
-    if (measure_peak(s, s->work_peaks) != OK) return FAILED;
+    i->t_old = s->state.now.t_old = *reached(peaks_of(s)) = begin;
+    if (measure_peak(s, peaks_of(s)->work) != OK) return FAILED;
     begin_step(s);
     if (look_at_time(&x, i->t) != OK) return FAILED;
     *event |= x.passed;
@@ -337,23 +342,64 @@ static Status step(Solver *s, int *event) {
 
 static Status here(Solver *s, int first) {
     const double t = s->state.now.t;
-    double *values = s->work_peaks;
+    double *values = peaks_of(s)->work;
     if (measure_peak(s, values) != OK) return FAILED;
-    for (int k = 0; k < s->peaks; k++) {
-        double *kept = s->peak + PEAK_PARTS * k;
+    for (int k = 0; k < PEAK_COUNT; k++) {
+        double *kept = peaks_of(s)->kept + PEAK_PARTS * k;
         if (first) {
             kept[PEAK_MAX] = kept[PEAK_MIN] = values[k];
             kept[PEAK_MAX_TIME] = kept[PEAK_MIN_TIME] = t;
         }
         const int more = keep_peaks(s, k, 1, t, t, values[k]), less = keep_peaks(s, k, -1, t, t, -values[k]);
-        if (s->peak_columns == 0) continue;
-        s->iwork_peaks[2 * k] = first || (more && record_time(s, k, 1) == t);
-        s->iwork_peaks[2 * k + 1] = first || (less && record_time(s, k, -1) == t);
+        if (peaks_of(s)->columns == 0) continue;
+        peaks_of(s)->which[2 * k] = first || (more && record_time(s, k, 1) == t);
+        peaks_of(s)->which[2 * k + 1] = first || (less && record_time(s, k, -1) == t);
     }
-    *reached(s) = s->state.now.t_old = t;
+    *reached(peaks_of(s)) = s->state.now.t_old = t;
     begin_step(s);
     vary_records_here(s, first); /* evaluates elsewhere */
     return OK;
 }
 
-SHARED_VALUE const Peaks PEAKS = {doubles_of_peaks, here, pass, step};
+/* ------------------------------------------------------------------ the feature */
+
+static void *layout_peaks(Solver *s, Arena *saved, Arena *scratch) {
+    const int width = solver_width(s), columns = DERIVATIVES != NULL ? DERIVATIVES->of_peaks(COLUMN_COUNT) : 0;
+    Peaks counted, *x = arena_take(scratch, 1, sizeof *x), *into = x;
+    if (x == NULL) x = memset(&counted, 0, sizeof counted);
+    x->columns = columns;
+    x->vary = columns > 0 ? DERIVATIVES->changes : NULL;
+    x->kept = arena_doubles(saved, peaks_saved(PEAK_COUNT, columns));
+    observed_layout(&x->seen, scratch, s->system);
+    x->work = arena_doubles(scratch, (PIECES + 2 + PEAK_PARTS) * (1 + PEAK_COUNT) + 2 * width);
+    x->which = arena_ints(scratch, columns > 0 ? 2 * PEAK_COUNT : 0);
+    const int changes = columns > 0 ? PEAK_COUNT : 0;
+    x->changes = arena_doubles(scratch, changes);
+    x->rates = arena_doubles(scratch, changes);
+    x->before = arena_doubles(scratch, changes);
+    return into;
+}
+
+static Status start_peaks(Solver *s) { return here(s, 1); }
+static Status peaks_after(Solver *s) { return here(s, 0); }
+
+static void peaks_before(Solver *s) {
+    if (peaks_of(s)->columns > 0) peaks_of(s)->vary->before(s);
+}
+
+/* Extremes are known as far as the state is. */
+static const char *flaw_of_peaks(const Solver *s, int started, int exchange, double *value) {
+    const Peaks *x = peaks_of(s);
+    for (int k = 0; k < peaks_saved(PEAK_COUNT, x->columns); k++)
+        if (!isfinite(*value = x->kept[k])) return "peaks";
+    *value = *reached(x);
+    if (!started) return NULL;
+    return (exchange ? *value > s->state.now.t : *value != s->state.now.t) ? "time of the peaks" : NULL;
+}
+
+static const double *value_of_peak(const Solver *s, int place, int index) {
+    return is_of_peak((Place)place) ? &peak_record(peaks_of(s), index)[place - AT_PEAK_MAX] : NULL;
+}
+
+SHARED_VALUE const Feature PEAKS = {layout_peaks,  1,    start_peaks,   pass,         peaks_before,
+                                    peaks_after, step, flaw_of_peaks, value_of_peak};
