@@ -30,7 +30,7 @@ from .guess import guessed
 from .moving import moving_of
 from .nearest import Nearest
 from .rows import Array, Rows, condition
-from .unclosed import left_open, parallel, unfollowed
+from .unclosed import left_open, parallel, turned_over, unfollowed
 
 EPS = float(np.finfo(float).eps)
 
@@ -81,7 +81,8 @@ def assemble(
             starts = [found for found, _ in begun]
             q, missed = Nearest(moving, [f], held, np.array([*places.values()])).places(starts)
     if missed.max(initial=0.0) > CLOSED:
-        problems = list(unfollowed(draft, model, parts, moving, closing, starts))
+        problems = list(turned_over(moving, closing, f.values(q), q))
+        problems += list(unfollowed(draft, model, parts, moving, closing, starts))
         raise ModelError(model.name, problems or list(left_open(closing, f.values(q), missed)))
     _tell(model, places, held.values(q), size)
     _tell_beyond_limits(model, draft, parts, q)

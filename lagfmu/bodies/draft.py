@@ -189,9 +189,9 @@ class Draft:
         self.unwrapped[angle] = rate, within_turn
         return Timed(angle, rate, sp.S.Zero)
 
-    def hold(self, name: str, f: Timed, text: str) -> None:
-        """A row f = 0."""
-        self.constraints.append(Tie(name, f.value, text, rates=(f.rate, f.bend)))
+    def hold(self, name: str, f: Timed, text: str, side: Expr = 1) -> None:
+        """A row f = 0, met as it is meant where `side` is positive."""
+        self.constraints.append(Tie(name, f.value, text, rates=(f.rate, f.bend), side=side))
 
     def second(self, f: Timed) -> Expr:
         """The second derivative: the bend, and the rate, which is linear in the speeds, of accelerations."""

@@ -3,10 +3,10 @@
 A row that holds back a translation is f = e . (p2 - p1) [m] with an axis e of the first marker: its
 multiplier is the component along e of the force [N] that the second body receives at p2; the first receives
 the opposite force there.  A row that holds back a rotation is f = angle2 - angle1 [rad] in the plane; in
-space, with a, b, c right-handed from the axis a of the joint, a2 . b1 and -a2 . c1, whose rates are
-(w2 - w1) . (a2 x b1) and -(w2 - w1) . (a2 x c1): where f is 0 its multiplier is the torque [N.m] on the
-second body about c, about b.  The rows of the joint A are A.x, A.y, A.z, A.rx, A.ry, A.rz: named by the axes
-of the first marker.
+space, with a, b, c right-handed from the axis a of the joint, a2 . b1 and -a2 . c1, which vanish at half a
+turn, too (`side`: a2 . a1 > 0), and whose rates are (w2 - w1) . (a2 x b1) and -(w2 - w1) . (a2 x c1): where
+f is 0 its multiplier is the torque [N.m] on the second body about c, about b.  The rows of the joint A are
+A.x, A.y, A.z, A.rx, A.ry, A.rz: named by the axes of the first marker.
 """
 
 from __future__ import annotations
@@ -96,16 +96,18 @@ class Joint:
             return
         i, j, k = axis, (axis + 1) % 3, (axis + 2) % 3  # a, b, c: right-handed
         if "across" not in self.turns:
-            self.hold(draft, wrench, k, product(b.axes[i], a.axes[j]))
+            along = dot(b.axes[i].value, a.axes[i].value)
+            self.hold(draft, wrench, k, product(b.axes[i], a.axes[j]), along)
             opposite = product(b.axes[i], a.axes[k])
             self.hold(draft, wrench, j, Timed(*(-x for x in opposite)))
         if "about" not in self.turns:
-            self.hold(draft, wrench, i, product(b.axes[j], a.axes[k]))
+            along = dot(b.axes[j].value, a.axes[j].value)
+            self.hold(draft, wrench, i, product(b.axes[j], a.axes[k]), along)
 
-    def hold(self, draft: Draft, wrench: Wrench, axis: int, f: Timed) -> None:
+    def hold(self, draft: Draft, wrench: Wrench, axis: int, f: Timed, side: Expr = 1) -> None:
         """A row that holds back the rotation about an axis of the first marker."""
         row, text = f"{self.name}.r{AXES[axis]}", f"{self.name} does not turn about {AXES[axis]}"
-        draft.hold(row, f, text)
+        draft.hold(row, f, text, side)
         wrench.torque[axis] += multiplier(row)
 
     @property

@@ -14,7 +14,7 @@ import numpy as np
 import sympy as sp
 from scipy.sparse import csr_array, diags_array, hstack, vstack
 
-from ..model.elements import TIME, name_of
+from ..model.elements import TIME, Tie, name_of
 from ..model.model import Model
 from ..numeric.linear import divided, factor, norms, row_sizes
 from ..numeric.system import Sparse
@@ -58,6 +58,14 @@ class Moving:
         self._quaternions = [slice(j, j + 4) for j in heads]
         self._angles = {places[q]: name_of(q) for q in model.unwrapped}
         self._turned = Rows(model, [(angle, sp.S.Zero) for angle in model.unwrapped.values()])
+        ties = [c for c in model.constraints if isinstance(c, Tie) and c.side != 1]
+        self._sided = [c.name.partition(".")[0] for c in ties]
+        self._sides = Rows(model, [(c.side, sp.S.Zero) for c in ties])
+
+    def turned_over(self, q: Array) -> list[str]:
+        """The joints that are turned over by half a turn: their rows vanish there, too."""
+        over = zip(self._sided, self._sides.values(q).tolist(), strict=True)
+        return list(dict.fromkeys(joint for joint, side in over if not side > 0))
 
     def sized(self, q: Array) -> float:
         """The size of the mechanism at q [m], by which its lengths are judged from now on."""
@@ -149,7 +157,7 @@ class Moving:
         self, rows: Sequence[Rows], wanted: Array, q: Array, enough: float = 0.0
     ) -> tuple[Array, Array]:
         """Coordinates near q at which the rows have the wanted values, and what each misses: at most
-        `enough`, or as little as can be."""
+        `enough`, or as little as can be; all where a joint is turned over."""
         r, A, size = self._missed(rows, wanted, q)
         if not (np.isfinite(r).all() and np.isfinite(np.abs(A).sum())):
             return q, np.full(len(r), np.inf)
@@ -165,7 +173,10 @@ class Moving:
             else:
                 break
             q, (r, A, size) = new, after
-        return q, np.abs(r / size)
+        missed = np.abs(r / size)
+        if missed.max(initial=0.0) <= CLOSED and self.turned_over(q):
+            missed = np.ones(len(r))
+        return q, missed
 
     def _missed(self, rows: Sequence[Rows], wanted: Array, q: Array) -> tuple[Array, Any, Array]:
         """What is missing (m), the slopes (m, n_v), and how large a change each row sees (m)."""

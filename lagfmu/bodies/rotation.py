@@ -102,12 +102,19 @@ def _oblique(axis: Any) -> Any:
 
 def onto(a: Any, b: Any) -> Any:
     """The least rotation that turns a unit vector onto another; half a turn about any axis if opposite."""
-    v, c = np.cross(a, b), float(a @ b)
-    if c < -1 + 1e-12:
-        n = np.cross(a, np.eye(3)[int(np.argmin(np.abs(a)))])
-        n /= np.linalg.norm(n)
-        return 2 * np.outer(n, n) - np.eye(3)
-    return np.eye(3) + skew(v) + skew(v) @ skew(v) / (1 + c)
+    a, b = a / np.linalg.norm(a), b / np.linalg.norm(b)
+    c, n = float(a @ b), b - (a @ b) * a
+    s = float(np.linalg.norm(n))
+    if s <= ROUNDING:
+        s, n = 0.0, np.eye(3)[int(np.argmin(np.abs(a)))]
+    for _ in range(2):  # across a, to rounding
+        n = n / np.linalg.norm(n)
+        n = n - (a @ n) * a
+    n = n / np.linalg.norm(n)
+    size = math.hypot(c, s)
+    c, s = c / size, s / size
+    in_plane = np.outer(a, a) + np.outer(n, n)
+    return np.eye(3) + (c - 1) * in_plane + s * (np.outer(n, a) - np.outer(a, n))
 
 
 def quaternion(R: Any) -> Any:

@@ -19,6 +19,7 @@ from .nearest import Nearest
 from .rows import Array, Rows, condition
 
 PARALLEL = 0.99  # cosine of the axes of a universal joint
+HALF = 1e-6  # of a row: met, though not as it is meant
 
 
 def parallel(closing: Sequence[Holonomic], values: Array) -> Iterator[str]:
@@ -31,6 +32,21 @@ def parallel(closing: Sequence[Holonomic], values: Array) -> Iterator[str]:
                 f"the axes of universal joint {joint!r} begin {apart:.3g} degrees from parallel, expected "
                 "square: choose other axes (axis=, second_axis=), turn a marker, or give a body another "
                 "start, as its rpy"
+            )
+
+
+def turned_over(
+    moving: Moving, closing: Sequence[Holonomic], values: Array, q: Array
+) -> Iterator[str]:
+    """Joints whose rows vanish, but at half a turn from where they hold."""
+    met = {c.name.partition(".")[0]: True for c in closing}
+    for c, value in zip(closing, values.tolist(), strict=True):
+        met[c.name.partition(".")[0]] &= abs(value) <= HALF
+    for joint in moving.turned_over(q):
+        if met[joint]:
+            yield (
+                f"joint {joint!r} begins turned over by half a turn: the axes of its markers point apart "
+                "there: start its bodies nearer to where they point the same way, or turn a marker"
             )
 
 

@@ -270,6 +270,12 @@ class Parts:
             names = [str(s) for s in (*eom.q, *eom.v)]
             w = values([*self.formulas.values()], [names[j] for j in self.formulas])
             found.append(Function("starts", text, {"p": eom.p}, {"w": w}))
+        if eom.sides and not eom.bare:
+            text = "Positive where joints are not turned over: products of axes vanish at half a turn too."
+            names = [self.constraints[k].name for k in eom.sides]
+            found.append(
+                Function("sides", text, still, {"side": values([*eom.sides.values()], names)})
+            )
         if self.jumps.surfaces:
             text = "h of each jump of the forces: where it passes 0, or a whole number."
             h = values([s.h for s in self.jumps.surfaces], eom.switch_states)

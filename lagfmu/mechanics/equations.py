@@ -9,7 +9,7 @@ from functools import cached_property
 import sympy as sp
 
 from ..model.display import Displayed
-from ..model.elements import TIME, Expr, name_of
+from ..model.elements import TIME, Expr, Tie, name_of
 from ..model.model import Constraint, Model, Output, Parameter
 from ..model.reactions import force_of_constraint, multiplier
 from ..model.speeds import quaternions
@@ -108,6 +108,12 @@ class EquationsOfMotion(Displayed):
         """The angles that equal an expression modulo 2 pi, by their place in q."""
         given = {self.symbols[s]: self.plain(e) for s, e in self.model.unwrapped.items()}
         return {j: given[s] for j, s in enumerate(self.q) if s in given}
+
+    @cached_property
+    def sides(self) -> dict[int, Expr]:
+        """By its row, what is positive where a joint holds as it is meant, not turned over."""
+        ties = {k: c for k, c in enumerate(self.constraints) if isinstance(c, Tie)}
+        return {} if self.bare else {k: self.plain(c.side) for k, c in ties.items() if c.side != 1}
 
     @cached_property
     def joint_coordinates(self) -> tuple[JointCoordinate, ...]:

@@ -126,7 +126,7 @@ def _expressions(eom: EquationsOfMotion) -> list[Expr]:
     flat += [e for o in eom.outputs for e in (o.expression, o.otherwise)]
     flat += [eom.plain(c.restitution) for c in eom.constraints if isinstance(c, Contact)]
     flat += [e for law in eom.frictions for e in law.expressions]
-    flat += eom.starts().values()
+    flat += [*eom.starts().values(), *eom.sides.values()]
     return [sp.sympify(e) for e in flat if e is not None]
 
 

@@ -66,9 +66,13 @@ class Holonomic:
 @dataclass(frozen=True)
 class Tie(Holonomic):
     """A row of a joint, f(q) = 0, that brings its derivatives, shorter than the chain rule finds them:
-    `rates`, f' and the part of f'' that is there while the speeds do not change."""
+    `rates`, f' and the part of f'' that is there while the speeds do not change.
+
+    `side` is positive where the row is met as it is meant: a product of axes vanishes at half a turn, too.
+    """
 
     rates: tuple[Expr, Expr] = (0, 0)
+    side: Expr = 1
 
 
 @dataclass(frozen=True)

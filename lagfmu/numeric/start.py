@@ -113,7 +113,22 @@ def _positions(
                 f"no digits left for a direction, expected at most {LARGEST_ANGLE:.1e} rad either "
                 "way: take off whole turns"
             )
+    _check_sides(at, q)
     return q, sizes(system, q, at.p, size), gap, near
+
+
+def _check_sides(at: Instant, q: Vector) -> None:
+    """Raises StartFailureError where a joint is turned over by half a turn, at which its rows vanish too."""
+    system = at.system
+    if system.sides is None:
+        return
+    found = system.sides(at.t, q.tolist(), at.u, at.p)
+    over = [system.rows[k].name for k, x in zip(system.sided, found, strict=True) if not x > 0]
+    for name in dict.fromkeys(n.partition(".")[0] for n in over):
+        raise StartFailureError(
+            f"the start is refused: at the start values that were set joint {name!r} is turned over by half "
+            "a turn: set attitudes of its bodies that are nearer to where its axes point the same way"
+        )
 
 
 def _velocities(

@@ -100,6 +100,8 @@ class System:
     surfaces(t, q, u, p) -> h of each surface at which forces jump (instant.py); `switches`: which of them
     jump wherever h is a whole number; `driven`: length of u, the inputs and the switch states behind them.
 
+    sides(t, q, u, p) -> what is positive where the joint of each row of `sided` is not turned over.
+
     starts(p) -> the start values that are expressions of parameters, at the positions `started` of (q, v).
 
     `estimated` are those of `prescribed` that are followed by a third derivative.  `outputs` are those of
@@ -142,6 +144,8 @@ class System:
     driven: int = 0
     started: tuple[int, ...] = ()
     starts: Callable[..., Any] | None = None
+    sided: tuple[int, ...] = ()
+    sides: Callable[..., Any] | None = None
 
     @cached_property
     def nq(self) -> int:

@@ -155,10 +155,13 @@ class Tables:
         }
 
     def _starts(self) -> None:
-        """Starts by formulas, and the joint coordinates by which a start may be given."""
+        """Starts by formulas, sides of joints, and the joint coordinates by which a start may be given."""
         if "starts" in self.fields:
             self.fields["started_count"] = len(self.parts.formulas)
             self._hold("const int", started=[*self.parts.formulas])
+        if "sides" in self.fields:
+            self.fields["side_count"] = len(self.eom.sides)
+            self._hold("const int", sided=[*self.eom.sides])
         joints = self.eom.joint_coordinates
         if joints and not self.prefix and self.parts.reduction is None:
             items: list[str] = []

@@ -152,7 +152,9 @@ def _system(parts: Parts) -> list[str]:
         fields["rates"] = _pattern(parts.rates)
         fields["quaternions"] = repr(eom.quaternions)
         fields["unwrapped"] = repr(tuple(eom.unwrapped))
-    for name in ("surfaces", "starts", "coulomb", "kinematics", "unwrapped_angles"):
+    if "sides" in texts:
+        fields["sided"] = repr(tuple(eom.sides))
+    for name in ("surfaces", "starts", "coulomb", "kinematics", "unwrapped_angles", "sides"):
         if name in texts:
             fields[name] = f"{p}{name}"
     if "lookups" in texts:

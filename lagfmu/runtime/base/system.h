@@ -129,6 +129,11 @@ struct System {
     int started_count;
     const int *started;
     void (*starts)(const double *p, double *w);
+    /* What is positive where the joint of a row is not turned over by half a turn, at which products of axes vanish, too:
+     * side (side_count), of the rows `sided`.  0 and NULL without. */
+    int side_count;
+    const int *sided;
+    void (*sides)(double t, const double *q, const double *u, const double *p, double *side);
     int joint_count;               /* 0 and NULL without */
     const JointCoordinate *joint;  /* (joint_count) */
     int joint_rates, joint_groups;

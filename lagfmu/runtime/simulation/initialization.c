@@ -44,6 +44,23 @@ static Status check_masses(const Start *x) {
 }
 
 /* Positions on the constraints; contacts that touch or were penetrated are closed, for now. */
+/* At half a turn the rows of a joint vanish, too. */
+static Status check_turned_over(const Start *x) {
+    const System *s = x->s->system;
+    double *side = x->s->stepped.f;
+    if (s->side_count == 0) return OK;
+    s->sides(x->at.t, x->s->state.q, x->at.u, x->at.p, side);
+    for (int i = 0; i < s->side_count; i++) {
+        const char *name = s->rows[s->sided[i]].name;
+        if (!(side[i] > 0))
+            return fail(&x->s->why,
+                        "the start is refused: at the start values that were set joint '%.*s' is turned over by half a "
+                        "turn: set attitudes of its bodies that are nearer to where its axes point the same way",
+                        (int)strcspn(name, "."), name);
+    }
+    return OK;
+}
+
 static Status find_positions(const Start *x) {
     const System *s = x->s->system;
     State *state = &x->s->state;
@@ -73,7 +90,7 @@ static Status find_positions(const Start *x) {
         if (still) break;
         memcpy(state->q, moved, (size_t)s->nq * sizeof *moved);
     }
-    if (check_angles(x) == FAILED) return FAILED;
+    if (check_angles(x) == FAILED || check_turned_over(x) == FAILED) return FAILED;
     nominals_sizes(x->s, x->at, state->q);
     return OK;
 }
