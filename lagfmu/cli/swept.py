@@ -23,7 +23,8 @@ NUMBER = re.compile(r"[-+]?\d[\d.]*(?:e[-+]?\d+)?")
 
 
 def print_sweep(found: Any) -> None:
-    """A row a run where there are few, else a line a kept quantity; the causes of what was refused."""
+    """A row a run where there are few, else a line a kept quantity; why some were refused, which start values
+    were moved."""
     runs = one_by_one(found)
     status = runs["status"].values
     refused = int((status != "ok").sum())
@@ -35,7 +36,8 @@ def print_sweep(found: Any) -> None:
             say(f"  {name}: {_range(runs, name, refused)}")
     else:
         _print_runs(runs, names, refused > 0)
-    _print_reasons([str(r) for r in runs["reason"].values if r])
+    _print_reasons([str(r) for r in runs["reason"].values if r], "refused")
+    _print_reasons([str(r) for r in runs["moved"].values if r], "begin elsewhere")
 
 
 def _print_runs(runs: Any, names: Sequence[str], refused: bool) -> None:
@@ -88,13 +90,13 @@ def _number(value: float, none: str = "") -> str:
     return "infinite" if abs(value) >= INFINITE else f"{value:.6g}"
 
 
-def _print_reasons(texts: Sequence[str]) -> None:
+def _print_reasons(texts: Sequence[str], what: str) -> None:
     """Those that differ in numbers are one."""
     first = {NUMBER.sub("#", r): r for r in reversed(texts)}
     reasons = Counter(NUMBER.sub("#", r) for r in texts)
     for kind, count in reasons.most_common(SHOWN):
         text = first[kind] if count == 1 else f"{first[kind]}, and {count - 1} like it"
-        say(f"  {count} refused: {text}")
+        say(f"  {count} {what}: {text}")
     if len(reasons) > SHOWN:
         rest = sum(reasons.values()) - sum(c for _, c in reasons.most_common(SHOWN))
-        say(f"  {rest} refused for {len(reasons) - SHOWN} other reasons")
+        say(f"  {rest} {what} for {len(reasons) - SHOWN} other reasons")

@@ -4,12 +4,13 @@ else by the loop of the session: slower, with the same numbers."""
 from __future__ import annotations
 
 import ctypes
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..numeric.start_priority import MISSES
 from .binary import BATCH, is_ours, listen
 from .session import WARNING, RefusalError, Run, Session
 
@@ -37,13 +38,15 @@ class Plan:
 @dataclass(frozen=True)
 class Outcome:
     """What became of runs: `result` (runs, keep), `trajectory` (runs, points, keep) or None, the status of
-    each, the time [s] that it reached, and of those that were refused the reason, by number."""
+    each, the time [s] that it reached, and by number: of those that were refused the reason, of those that
+    begin elsewhere than was asked for which start values were moved."""
 
     result: NDArray[np.float64]
     trajectory: NDArray[np.float64] | None
     status: NDArray[np.int32]
     reached: NDArray[np.float64]
     reasons: dict[int, str]
+    moved: dict[int, str] = field(default_factory=dict)
 
 
 def run_batch(session: Session, plan: Plan, values: NDArray[np.float64]) -> Outcome:
@@ -110,15 +113,15 @@ def _in_library(session: Session, plan: Plan, values: NDArray[np.float64], found
         whole=int(plan.whole),
         current=0,
     )
-    for field, array in arrays.items():
-        setattr(batch, field, None if array is None else array.ctypes.data)
+    for name, array in arrays.items():
+        setattr(batch, name, None if array is None else array.ctypes.data)
 
     def hear(status: int, text: str) -> None:
         """Of several messages of a run, all."""
-        run = int(batch.current)
-        if status > WARNING:
-            known = found.reasons.get(run)
-            found.reasons[run] = f"{known}; {text}" if known else text
+        told = found.reasons if status > WARNING else found.moved if MISSES in text else None
+        if told is not None:
+            run = int(batch.current)
+            told[run] = f"{told[run]}; {text}" if run in told else text
 
     function = getattr(session.instance.dll, BATCH)
     function.argtypes, function.restype = [ctypes.c_void_p, ctypes.c_void_p], ctypes.c_int
@@ -144,6 +147,8 @@ def in_session(session: Session, plan: Plan, values: NDArray[np.float64], found:
     for r, row in enumerate(values):
         given = dict(zip(plan.vary, row.tolist(), strict=True))
         run = session.run(plan.times.tolist(), given, tolerance, names, inputs)
+        if run.moved:
+            found.moved[r] = "; ".join(run.moved)
         if len(run.rows):
             found.reached[r] = run.rows["time"][-1]
         if found.trajectory is not None:

@@ -45,7 +45,7 @@ def listen(hear: Hear | None) -> None:
 
 def instantiated(folder: Path, description: Any, name: str, log: bool) -> FMU2Slave | Slave3:
     """An instance for co-simulation of the FMU that lies unpacked in `folder`; one of lagfmu gives its
-    reasons unasked, and logs what it need not say only with `log`.  Raises what fmpy raises."""
+    reasons and warnings unasked, and logs events only with `log`.  Raises what fmpy raises."""
     library = {
         "instanceName": name,
         "guid": description.guid,
@@ -56,9 +56,11 @@ def instantiated(folder: Path, description: Any, name: str, log: bool) -> FMU2Sl
         if description.fmiVersion == "2.0":
             slave = FMU2Slave(**library)
             slave.instantiate(callbacks=_callbacks(), loggingOn=log or not is_ours(slave))
-            return slave
-        slave = Slave3(description.modelVariables, **library)
-        slave.begin(_log, log or not is_ours(slave))
+        else:
+            slave = Slave3(description.modelVariables, **library)
+            slave.begin(_log, log or not is_ours(slave))
+    if is_ours(slave) and not log:
+        slave.setDebugLogging(True, ["logStatusWarning"])
     return slave
 
 

@@ -21,6 +21,7 @@ from fmpy.fmi1 import FMICallException
 
 from ..errors import SimulationError
 from ..model.rule import missing
+from ..numeric.start_priority import MISSES
 from .archive import unpack
 from .binary import instantiated, listen
 from .read import (
@@ -53,11 +54,12 @@ class RefusalError(Exception):
 @dataclass(frozen=True)
 class Run:
     """Time and values, a row a communication point that was reached, and what ended the run early; `seconds`:
-    wall time of stepping and reading."""
+    wall time of stepping and reading; what the FMU said of each start value that it moved."""
 
     rows: Trajectory
     refusal: RefusalError | None
     seconds: float
+    moved: tuple[str, ...] = ()
 
 
 class Session:
@@ -66,7 +68,8 @@ class Session:
 
     `rules`: what its variables may be set to; `outputs` and `inputs`: their names;
     `experiment`: the default one; `time`: where it stands
-    [s]; `messages`: with `log` the statuses and texts of all that it has said.  Raises VerificationError for
+    [s]; `messages`: with `log` the statuses and texts of all that it has said; `moved`: what it said of each
+    start value that it moved.  Raises VerificationError for
     what is no FMU, SimulationError for one that cannot be stepped here, RefusalError with its own reason if
     it cannot be instantiated.
     """
@@ -78,6 +81,7 @@ class Session:
         self.messages: list[tuple[int, str]] = []
         self.instance: Any = None
         self._said: list[str] = []  # of calls that fail
+        self.moved: list[str] = []
         self._unpacked = ""
         self.folder: Path | None = None
         if not isinstance(target, (str, Path)):
@@ -152,6 +156,7 @@ class Session:
         """Reset if it was used; set up (times in s), set `values`, initialize."""
         given = dict(values or {})
         driven = {n: given.pop(n) for n in self.inputs if n in given}
+        self.moved.clear()
         if self.used:
             self.call("reset")
         self.used, self.time = True, start
@@ -186,6 +191,8 @@ class Session:
     def _hear(self, status: int, text: str) -> None:
         if self.log:
             self.messages.append((status, text))
+        if MISSES in text:
+            self.moved.append(text)
         if status > WARNING:
             self._said.append(text)
 
@@ -277,7 +284,7 @@ class Session:
             refusal = error
             self.renew()
         seconds = clock.perf_counter() - begun
-        return Run(self._table(names, rows), refusal, seconds)
+        return Run(self._table(names, rows), refusal, seconds, tuple(self.moved))
 
     def _feeder(self, inputs: Columns) -> Callable[[int], None]:
         """Sets inputs to their values at point k."""

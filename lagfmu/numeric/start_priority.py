@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 OMITTED, GIVEN, SET = 0, 1, 2  # nobody said it; the model's `start` does; the importer did
 LEFT_OUT = "start values that were left out"
+MISSES = "misses the constraints: projected to"
 
 
 class Moved(NamedTuple):
@@ -24,7 +25,7 @@ class Moved(NamedTuple):
 
     def __str__(self) -> str:
         return (
-            f"start value {self.name} = {self.given!r} misses the constraints: projected to {self.used!r} "
+            f"start value {self.name} = {self.given!r} {MISSES} {self.used!r} "
             f"(moved by {self.used - self.given:.3g})"
         )
 

@@ -37,7 +37,7 @@ from ..interface.rules import problems_of
 from ..model.file import in_scene
 from ..model.model import Model
 from ..model.scene import Scene
-from ..numeric.start_priority import LEFT_OUT
+from ..numeric.start_priority import LEFT_OUT, MISSES
 from ..numeric.tolerance import tolerance_problem
 from ..prepare.prepare import Prepared, prepare
 from ..prepare.starts import check_given, tell
@@ -47,7 +47,7 @@ from .result import Result
 if TYPE_CHECKING:
     from ..fmu.inprocess import InProcess
 
-STARTS = re.compile(rf"start value .* misses the constraints|{LEFT_OUT}")  # a message of a move
+STARTS = re.compile(rf"start value .* {MISSES}|{LEFT_OUT}")  # a message of a move
 BARS = "error bars"  # begins a message of them
 MOST = 5  # warnings that are told one by one
 

@@ -4,8 +4,8 @@
  *   d = d0 + P H^T c ,   H d = miss ,   M d0 = G^T mu ,  G d0 = c0 ,   M P b = b + G^T mu ,  G P b = 0
  *
  * c is found by A = H P H^T = L D L^T, row by row (Golub & Van Loan, Matrix Computations, sect. 4.1.2): one solve for
- * each joint coordinate that is held.  D_k is what is left free of it by the constraints and those before it: where
- * that vanishes it is determined by them, and c_k = 0.  The rates are linear in v: H, of which each row holds the
+ * each joint coordinate that is held, in the order of their priority.  D_k is what is left free of it by the constraints
+ * and those before it: where that vanishes it is determined by them, and c_k = 0.  The rates are linear in v: H, of which each row holds the
  * speeds of the bodies that the joint ties, is found by one evaluation for each group of speeds that meet in no joint. */
 #include "joint_coordinates.h"
 
@@ -14,7 +14,8 @@
 
 #include "numbers.h"
 
-static const double DETERMINED = 1e-10; /* sine squared of the angle between H_k and what is left free of it */
+/* Sine squared of the angle between H_k and what is left free of it; of one that stays only where it may. */
+static const double DETERMINED = 1e-10, NEARLY_DETERMINED = 1e-4;
 
 /* Row k of A and of L: k + 1 numbers. */
 static double *row_of(const struct JointSearch *x, int k) { return x->A + (size_t)k * (size_t)(k + 1) / 2; }
@@ -33,6 +34,7 @@ void joint_layout(Solver *s, Arena *scratch) {
     const int count[] = {nq, nq, nv, nv, nv, nv, of->m, n, n, n, n, n, of->joint_rates, of->output_count,
                          of->output_count};
     for (size_t i = 0; i < sizeof count / sizeof *count; i++) *array[i] = arena_doubles(scratch, count[i]);
+    x->order = arena_ints(scratch, n);
     x->A = arena_take(scratch, (size_t)n * (size_t)(n + 1) / 2, sizeof *x->A);
     x->zero = arena_doubles(scratch, nv + of->m);
 }
@@ -132,17 +134,18 @@ static double free_of(const Solver *s) {
 /* Row k of A becomes that of L, with D_k at its end: 0 where nothing is left free, or it is not held. */
 static Status factor_joint(Solver *s, int k) {
     struct JointSearch *x = s->joint_search;
+    const int of = x->order[k], firmly = (int)joint_priority(s, of) >= x->least;
     double *row = row_of(x, k);
     memset(x->part, 0, (size_t)s->system->nv * sizeof *x->part);
     memset(row, 0, (size_t)(k + 1) * sizeof *row);
-    if ((int)joint_priority(s, k) < x->least) return OK;
-    push_joint(s, k, 1);
+    if (!firmly && !x->gently) return OK;
+    push_joint(s, of, 1);
     const double whole = free_of(s);
     if (find_response(s) != OK) return FAILED;
-    double left = joint_along(s, k, x->y);
+    double left = joint_along(s, of, x->y);
     for (int j = 0; j < k; j++) {
         const double *other = row_of(x, j);
-        if (other[j] > 0) row[j] = joint_along(s, j, x->y) - dot(j, other, row);
+        if (other[j] > 0) row[j] = joint_along(s, x->order[j], x->y) - dot(j, other, row);
     }
     for (int j = 0; j < k; j++) {
         const double D = row_of(x, j)[j];
@@ -150,8 +153,16 @@ static Status factor_joint(Solver *s, int k) {
         left -= row[j] * row[j] / D;
         row[j] /= D;
     }
-    row[k] = left > DETERMINED * whole ? left : 0;
+    row[k] = left > (firmly ? DETERMINED : NEARLY_DETERMINED) * whole ? left : 0;
     return OK;
+}
+
+void joint_arrange(Solver *s) {
+    struct JointSearch *x = s->joint_search;
+    int count = 0;
+    for (int priority = PRIORITIES - 1; priority >= 0; priority--)
+        for (int k = 0; k < s->system->joint_count; k++)
+            if ((int)joint_priority(s, k) == priority) x->order[count++] = k;
 }
 
 Status joint_step(Solver *s, const int *rows) {
@@ -165,13 +176,13 @@ Status joint_step(Solver *s, const int *rows) {
     memcpy(x->d, b->dq, (size_t)of->nv * sizeof *x->d);
     for (int k = 0; k < of->joint_count; k++) {
         if (factor_joint(s, k) != OK) return FAILED;
-        c[k] = x->miss[k] - joint_along(s, k, x->d) - dot(k, row_of(x, k), c);
+        c[k] = x->miss[x->order[k]] - joint_along(s, x->order[k], x->d) - dot(k, row_of(x, k), c);
     }
     for (int k = 0; k < of->joint_count; k++) c[k] = row_of(x, k)[k] > 0 ? c[k] / row_of(x, k)[k] : 0;
     memset(x->part, 0, (size_t)of->nv * sizeof *x->part);
     for (int k = of->joint_count - 1; k >= 0; k--) {
         add_part(k, -c[k], row_of(x, k), c);
-        push_joint(s, k, c[k]);
+        push_joint(s, x->order[k], c[k]);
     }
     if (find_response(s) != OK) return FAILED;
     add_part(of->nv, 1, x->y, x->d);

@@ -10,6 +10,8 @@ struct JointSearch {
     Instant at;
     int of_rates;                 /* 1: rates are looked for; 0: values */
     int least;                    /* the priority from which joint coordinates are held */
+    int gently;                   /* 1: others stay where those, and the constraints, leave them free */
+    int *order;                   /* (joint_count) joint coordinates by falling priority */
     double *asked;                /* (system_starts()) */
     Priority *priority, *held;    /* (system_starts()); (nv) SET where a speed is held, otherwise OMITTED */
     double *q, *v;                /* (nq), (nv) what is looked for */
@@ -44,6 +46,9 @@ SHARED void joint_measure(Solver *s, const double *q);
 /* miss and size of the values, or of the rates with v (nv), where they were measured last; the largest miss of those
  * that are held, relative to its size. */
 SHARED double joint_missing(Solver *s, const double *v);
+
+/* x->order, by the priorities of what is looked for. */
+SHARED void joint_arrange(Solver *s);
 
 /* d (nv) with G d = c on the rows (m) and H d = miss, as nearly as can be, where nothing that is held moves; by M and
  * G at the state that was evaluated last, which are lost. */

@@ -2,8 +2,9 @@
  * (joint_coordinates.c) are short beside the mechanism and projected one by one, so that of two branches it is the one
  * that leads on from there.
  *
- * What is not asked for stays where that is possible: at first joint coordinates and others that the model gives; then
- * what the importer set; at last joint coordinates that it set, alone. */
+ * What is not asked for stays where that is possible: at first all joint coordinates, as those of an open chain, and
+ * others that the model gives; then joint coordinates that it gives; then what the importer set; at last joint
+ * coordinates that it set, alone.  A joint coordinate that is given speaks for the coordinates in it. */
 #include "joint_start.h"
 
 #include <math.h>
@@ -16,12 +17,17 @@
 #include "segment.h"
 #include "thresholds.h"
 
-enum { JOINT_STEPS = 1000, JOINT_HALVINGS = 12, JOINT_LEVELS = 3 };
+enum { JOINT_STEPS = 1000, JOINT_HALVINGS = 12 };
 static const double JOINT_SHORT = 0.25;    /* [rad], or of what a speed moves */
 static const double JOINT_REACHED = 1e-12; /* relative to the terms */
 
-/* The priorities from which joint coordinates and others are held at each level. */
-static const int HELD_JOINTS[JOINT_LEVELS] = {GIVEN, SET, SET}, HELD_OTHERS[JOINT_LEVELS] = {GIVEN, SET, PRIORITIES};
+/* The priorities from which joint coordinates and others are held at each level; whether other joint coordinates stay
+ * where they are left free. */
+static const struct {
+    int joints, others, gently;
+} LEVELS[] = {{OMITTED, GIVEN, 0}, {GIVEN, GIVEN, 1}, {GIVEN, GIVEN, 0},     {SET, SET, 1},
+              {SET, SET, 0},       {SET, PRIORITIES, 1}, {SET, PRIORITIES, 0}};
+enum { LEVEL_COUNT = sizeof LEVELS / sizeof *LEVELS, LEVELS_OF_GIVEN = 3 };
 
 /* What is missing a part of d further on, at `trial`, on the constraints; HUGE_VAL where there is no such place. */
 static double try_joints(Solver *s, double part, int *rows) {
@@ -76,21 +82,23 @@ static Status find_joint_rates(Solver *s, const int *rows) {
     return FAILED;
 }
 
-/* Values or rates from those of the state, by the first level at which they are reached; with the contacts in place that
- * are closed in it. */
-static void find_joints(Solver *s, int of_rates) {
+/* Values or rates from those of the state, by the first of `levels` at which they are reached; with the contacts in place
+ * that are closed in it. */
+static Status find_joints(Solver *s, int of_rates, int levels) {
     struct JointSearch *x = s->joint_search;
     const System *of = s->system;
     int *rows = s->iwork_initial;
     Status status = FAILED;
     x->of_rates = of_rates;
-    for (int level = 0; level < JOINT_LEVELS && status != OK; level++) {
-        x->least = HELD_JOINTS[level];
+    joint_arrange(s);
+    for (int level = 0; level < levels && status != OK; level++) {
+        x->gently = LEVELS[level].gently;
+        x->least = LEVELS[level].joints;
         if (of_rates)
             memcpy(x->held, x->priority + of->nq, (size_t)of->nv * sizeof *x->held);
         else
             priority_moves(of, x->priority, x->held);
-        for (int i = 0; i < of->nv; i++) x->held[i] = (int)x->held[i] >= HELD_OTHERS[level] ? SET : OMITTED;
+        for (int i = 0; i < of->nv; i++) x->held[i] = (int)x->held[i] >= LEVELS[level].others ? SET : OMITTED;
         system_active(of, s->state.closed, rows);
         if (of_rates)
             memcpy(x->v, s->state.v, (size_t)of->nv * sizeof *x->v);
@@ -99,6 +107,7 @@ static void find_joints(Solver *s, int of_rates) {
         for (int k = 0; k < of->m; k++) rows[k] &= of_rates || of->rows[k].kind != NONHOLONOMIC;
         status = of_rates ? find_joint_rates(s, rows) : find_joint_places(s, rows);
     }
+    return status;
 }
 
 /* Whether a joint coordinate is, or its rate; who said what, of one that is a coordinate behind with the others. */
@@ -120,23 +129,30 @@ static int any_joint_set(Solver *s, const double *begin, const Priority *priorit
     return any;
 }
 
-/* At the start without them: those that are not set are to stay as they are there; one that is speaks for the
- * coordinates in it that the model gives, and its rate for the speeds. */
+/* Whether all are, with their rates, where they are described at the state. */
+static int joints_stay(Solver *s) {
+    struct JointSearch *x = s->joint_search;
+    int stay = 1;
+    joint_measure(s, s->state.q);
+    for (x->of_rates = 0; x->of_rates < 2; x->of_rates++) {
+        (void)joint_missing(s, s->state.v);
+        for (int k = 0; k < s->system->joint_count; k++) stay &= fabs(x->miss[k]) <= TOUCH * x->size[k];
+    }
+    return stay;
+}
+
+/* One that is given or set speaks for the coordinates in it that the model gives, and its rate for the speeds. */
 static void begin_without_joints(Solver *s) {
     struct JointSearch *x = s->joint_search;
     const System *of = s->system;
     joint_measure(s, s->state.q);
     for (int k = 0; k < of->joint_count; k++) {
-        double *asked = &x->asked[joint_place(s, k, 0)];
         const Priority *priority = &x->priority[joint_place(s, k, 0)];
-        if (priority[0] != SET) asked[0] = x->value[k];
-        if (priority[1] != SET) asked[1] = x->drift[k] + joint_along(s, k, s->state.v);
         for (int h = of->joint[k].begin; h < of->joint[k].end; h++) {
             const int i = of->joint_rate[h].speed;
             Priority *of_speed = &x->priority[of->nq + i];
-            if (x->H[h] == 0) continue;
-            if (priority[1] == SET && *of_speed == GIVEN) *of_speed = OMITTED;
-            if (priority[0] != SET) continue;
+            if (priority[1] != OMITTED && *of_speed == GIVEN) *of_speed = OMITTED;
+            if (priority[0] == OMITTED) continue;
             if (of->kinematics == NULL && x->priority[i] == GIVEN) x->priority[i] = OMITTED;
             for (int e = 0; e < of->rates; e++)
                 if (of->rate_column[e] == i && x->priority[of->rate_row[e]] == GIVEN)
@@ -179,14 +195,14 @@ static Status start_at(Solver *s, const double *v) {
 }
 
 /* Values, then rates; where contacts may open they are left aside, otherwise those stay that the latest start closed. */
-static Status find_joint_start(Solver *s, int may_open) {
+static Status find_joint_start(Solver *s, int may_open, int levels) {
     struct JointSearch *x = s->joint_search;
     const size_t contacts = (size_t)s->system->contacts * sizeof *s->state.closed;
     if (may_open) memset(s->state.closed, 0, contacts);
-    find_joints(s, 0);
+    if (find_joints(s, 0, levels) != OK && levels < LEVEL_COUNT) return FAILED;
     if (start_at(s, x->asked + s->system->nq) != OK) return FAILED;
     if (may_open) memset(s->state.closed, 0, contacts);
-    find_joints(s, 1);
+    if (find_joints(s, 1, levels) != OK && levels < LEVEL_COUNT) return FAILED;
     if (start_at(s, x->v) != OK) return FAILED;
     return check_joints(s, NULL, NULL);
 }
@@ -196,11 +212,19 @@ static Status start_by_joints(Solver *s, double t, const double *begin, const Pr
     struct JointSearch *x = s->joint_search;
     const int nq = s->system->nq;
     const double *v0 = begin + nq;
-    if (!any_joint_set(s, begin, priority)) return solver_start(s, t, begin, v0, priority, moved, context);
+    const int set = any_joint_set(s, begin, priority);
     if (solver_start(s, t, begin, v0, priority, NULL, NULL) != OK) return FAILED;
     x->at = segment_instant(s, t);
+    if (!set && joints_stay(s)) {
+        const Start plain = {s, x->at, begin, v0, priority, s->moves, priority + nq};
+        if (moved != NULL) initial_moved(&plain, moved, context);
+        return OK;
+    }
     begin_without_joints(s);
-    if (find_joint_start(s, 1) != OK && (s->system->contacts == 0 || find_joint_start(s, 0) != OK)) return FAILED;
+    const int contacts = s->system->contacts;
+    if ((contacts == 0 || find_joint_start(s, 0, LEVELS_OF_GIVEN) != OK) && find_joint_start(s, 1, LEVEL_COUNT) != OK &&
+        (contacts == 0 || find_joint_start(s, 0, LEVEL_COUNT) != OK))
+        return FAILED;
     if (moved == NULL) return OK;
     const Start from = {s, x->at, x->asked, x->asked + nq, x->priority, s->moves, x->priority + nq};
     initial_moved(&from, moved, context);

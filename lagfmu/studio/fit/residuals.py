@@ -24,7 +24,8 @@ class Residuals:
 
     `given`: what is set besides; `step` [s]: of inputs, which an FMU gets as straight pieces; `difference`:
     the part of its magnitude by which a free value is changed to find derivatives (central differences);
-    `runs`: how many there were; `ended`: in one of them the FMU's own derivatives did not exist throughout.
+    `runs`: how many there were; `moved`: start values that the latest moved, as the FMU says it; `ended`: in
+    one of them the FMU's own derivatives did not exist throughout.
     """
 
     def __init__(
@@ -39,6 +40,7 @@ class Residuals:
         self.tolerance, self.step = tolerance, step
         self.difference = tolerance ** (1 / 3)
         self.runs = 0
+        self.moved: tuple[str, ...] = ()
         self.own: set[str] = set()
         self.ended = False
         self.measured = np.concatenate(
@@ -142,6 +144,7 @@ class Residuals:
         )
         if run.refusal is not None:
             raise run.refusal
+        self.moved = run.moved
         return run.rows[np.searchsorted(times, wanted)]
 
 

@@ -17,6 +17,7 @@ from ...fmu.write import as_fmu
 from ...model.model import Model
 from ...model.scene import Scene
 from ...numeric.tolerance import tolerance_problem
+from ...prepare.starts import tell
 from .certainty import certainty
 from .experiment import experiments_of
 from .problem import LOSSES, Problem, derivatives_of, problem_of
@@ -88,7 +89,9 @@ def fit(
         for one in asked.series:
             warn_of_rates(one.inputs, session.rules)
         residuals = Residuals(asked, session, tolerance, step, given)
-        return _solve(session.description.modelName, asked, residuals, loss)
+        found = _solve(session.description.modelName, asked, residuals, loss)
+        tell(residuals.moved)
+        return found
 
 
 def _solve(name: str, problem: Problem, residuals: Residuals, loss: str) -> Fit:

@@ -39,6 +39,7 @@ from ...model.scene import Scene
 from ...model.units import for_reading
 from ...numeric.tolerance import tolerance_problem
 from ...page.table import as_text, new_table
+from ...prepare.starts import tell
 from ...verification.reference import Driven, driven
 
 Floats = NDArray[np.float64]
@@ -307,6 +308,7 @@ def _found(
     flag = [names.SENSITIVITY_VALID] if told and names.SENSITIVITY_VALID in rules else []
     try:
         base = runs.end(given, [*told.values(), *flag])
+        tell(runs.session.moved)
     except RefusalError as error:
         raise SimulationError(f"the run at the given values fails: {error.message}") from None
     ended = bool(flag) and not base[flag[0]]

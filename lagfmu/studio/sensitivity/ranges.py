@@ -17,6 +17,7 @@ from rich.table import Table
 
 from ...errors import SettingError, SimulationError
 from ...page.table import as_text, new_table
+from ...prepare.starts import tell
 from ..sweep.sweep import sweep
 from ..sweep.table import happened
 
@@ -142,6 +143,7 @@ def over_ranges(
         raise SimulationError(
             f"{refused} of {len(points)} runs were refused: {reason}; narrow the ranges"
         )
+    tell(dict.fromkeys(str(text) for text in runs["moved"].values if text))
     indices: dict[str, dict[str, dict[str, float]]] = {}
     without = {}
     for name, column in zip(of, keep, strict=True):

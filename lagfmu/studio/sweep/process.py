@@ -70,9 +70,11 @@ def joined(outcomes: list[Outcome]) -> Outcome:
     if len(outcomes) == 1:
         return outcomes[0]
     reasons: dict[int, str] = {}
+    moved: dict[int, str] = {}
     first = 0
     for o in outcomes:
         reasons |= {first + r: text for r, text in o.reasons.items()}
+        moved |= {first + r: text for r, text in o.moved.items()}
         first += len(o.status)
     whole = [o.trajectory for o in outcomes if o.trajectory is not None]
     return Outcome(
@@ -81,6 +83,7 @@ def joined(outcomes: list[Outcome]) -> Outcome:
         np.concatenate([o.status for o in outcomes]),
         np.concatenate([o.reached for o in outcomes]),
         reasons,
+        moved,
     )
 
 

@@ -1,7 +1,7 @@
 """The results of a study: an Arrow table a part, one file of all runs, an xarray Dataset.
 
 A run is a row: its number, what varied, what was kept, `status` (ok, discard, error, fatal, crashed,
-timeout), `reason` and the time that it reached.
+timeout), `reason`, start values that were `moved`, and the time that it reached.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ from .parts import Parts, synchronize
 from .process import CRASHED, TIMED_OUT
 
 INFINITE = sys.float_info.max  # stands for infinity where an FMU's Real must be finite: error bars
+TEXTS = ("status", "reason", "moved")
 METADATA = "-metadata.json"  # of a CSV file, behind its name: W3C's tabular metadata
 
 
@@ -68,7 +69,10 @@ class Layout:
         columns += [(n, pa.array(outcome.result[:, k])) for k, n in enumerate(self.kept.columns)]
         columns += [
             ("status", pa.array([status_name(s) for s in outcome.status.tolist()], pa.string())),
-            ("reason", pa.array([outcome.reasons.get(k, "") for k in range(count)], pa.string())),
+            *(
+                (n, pa.array([told.get(k, "") for k in range(count)], pa.string()))
+                for n, told in (("reason", outcome.reasons), ("moved", outcome.moved))
+            ),
             ("reached", pa.array(outcome.reached)),
         ]
         fields = [pa.field(n, a.type, metadata=self.about(n)) for n, a in columns]
@@ -184,7 +188,7 @@ def dataset(
         about = layout.about(n)
         about["units"] = about.pop("unit")
         data[n] = (dims, table[n].to_numpy().reshape(shape), about)
-    for n in ("status", "reason"):  # objects: of a fixed width, one long text would cost all runs
+    for n in TEXTS:  # objects: of a fixed width, one long text would cost all runs
         data[n] = (dims, table[n].to_numpy().reshape(shape))
     if trajectories is not None:
         coords["time"] = ("time", times, {"units": "s"})
@@ -218,7 +222,7 @@ def read_rows(path: Path) -> Any:
             facts = json.loads(table.schema.metadata[b"lagfmu"])
             units = {f.name: f.metadata[b"unit"].decode() for f in table.schema}
             rows = table.to_pandas()
-        names = [n for n in rows.columns if n not in ("run", "status", "reason", "reached")]
+        names = [n for n in rows.columns if n not in ("run", "reached", *TEXTS)]
         causes = [n for n in names if ":" not in n]
         dim = causes[0] if len(causes) == 1 and rows[causes[0]].is_monotonic_increasing else "run"
         made = xr.Dataset(
@@ -230,7 +234,7 @@ def read_rows(path: Path) -> Any:
             },
             dict(facts),
         )
-        for n in ("status", "reason"):
+        for n in TEXTS:
             made[n] = (dim, rows[n].fillna("").to_numpy(object))
         for n in made.variables:
             made[n].attrs["units"] = units.get(str(n), "")
