@@ -14,6 +14,8 @@ typedef struct {
     Priority priority[64]; /* of the start values */
 } Bench;
 
+static const int NONE[64]; /* of so many contacts none is dead */
+
 void *bench_open(const System *system);
 void bench_close(Bench *b);
 const char *bench_why(const Bench *b);
@@ -99,12 +101,12 @@ int bench_modes(Bench *b, const double *q, const double *v, int *closed, const i
 
 int bench_impact(Bench *b, const double *q, double *v, const int *entering, int plastic,
                  double *Lambda) {
-    return impact(&b->solver, instant(b), q, v, entering, plastic, Lambda);
+    return impact(&b->solver, instant(b), q, v, entering, plastic ? NULL : NONE, Lambda);
 }
 
 int bench_impacts(Bench *b, const double *q, double *v, const int *touching, const double *slow,
                   int *struck) {
-    return impacts(&b->solver, instant(b), q, v, touching, slow, struck);
+    return impacts(&b->solver, instant(b), q, v, touching, slow, NONE, struck);
 }
 
 /* From now on evaluations are counted. */

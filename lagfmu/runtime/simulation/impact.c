@@ -183,17 +183,19 @@ static Status bound(Struck *x, double time, const Impulse *found, const Impulse 
     return OK;
 }
 
-static void set_restitution(Struck *x, int plastic) {
-    x->s->system->restitution(x->s->p, x->e);
-    if (plastic) memset(x->e, 0, (size_t)x->s->system->m * sizeof *x->e);
+static void set_restitution(Struck *x, const int *dead) {
+    const System *system = x->s->system;
+    system->restitution(x->s->p, x->e);
+    for (int c = 0; c < system->contacts; c++)
+        if (dead == NULL || dead[c]) x->e[system->contact[c]] = 0;
 }
 
 /* The law without friction, and then with it where it can be found. */
 static Status strike_together(Struck *x, Instant at, const double *q, const double *v, const int *entering,
-                              int is_plastic, const Impulse *found, const Impulse *plastic) {
+                              const int *dead, const Impulse *found, const Impulse *plastic) {
     int done = 0;
     if (x->s->system->frictions > 0) {
-        set_restitution(x, is_plastic);
+        set_restitution(x, dead);
         if (OPTIONAL.friction->impact(x->s, at, q, v, entering, x->slip, x->e, *plastic, *found, &done) != OK)
             return FAILED;
     }
@@ -201,11 +203,11 @@ static Status strike_together(Struck *x, Instant at, const double *q, const doub
         if (gain(x, found, found, 1) > 0) blend(x, found, plastic);
         return OK;
     }
-    set_restitution(x, is_plastic);
+    set_restitution(x, dead);
     return newton_impact(x, at.t, found) != OK ? FAILED : bound(x, at.t, found, plastic);
 }
 
-Status impact(Solver *s, Instant at, const double *q, double *v, const int *entering, int plastic,
+Status impact(Solver *s, Instant at, const double *q, double *v, const int *entering, const int *dead,
               double *Lambda) {
     const System *system = s->system;
     const int nv = system->nv, m = system->m, contacts = system->contacts;
@@ -236,7 +238,7 @@ Status impact(Solver *s, Instant at, const double *q, double *v, const int *ente
         if (fabs(x.slip[j]) <= IMPACT_ROUNDING * terms) x.slip[j] = 0;
         x.zero[j] = 0;
     }
-    if (strike_together(&x, at, q, v, entering, plastic, &found, &soft) != OK) return FAILED;
+    if (strike_together(&x, at, q, v, entering, dead, &found, &soft) != OK) return FAILED;
     s->state.now.lost -= gain(&x, &found, &found, 1);
     for (int j = 0; j < nv; j++) v[j] += found.dv[j];
     return OK;
@@ -257,8 +259,8 @@ static int find_entering(const Solver *s, const double *v, const int *touching, 
     return any;
 }
 
-Status impacts(Solver *s, Instant at, const double *q, double *v, const int *touching,
-               const double *slow, int *struck) {
+Status impacts(Solver *s, Instant at, const double *q, double *v, const int *touching, const double *slow,
+               const int *dead, int *struck) {
     const System *system = s->system;
     const int contacts = system->contacts;
     int *entering = s->iwork_impact + impact_ints(system->m, contacts) - contacts;
@@ -268,7 +270,7 @@ Status impacts(Solver *s, Instant at, const double *q, double *v, const int *tou
     for (int round = 1; round <= IMPACT_ROUNDS; round++) {
         if (mechanism_evaluate(&s->stepped, at, q, v) != OK) return FAILED;
         if (!find_entering(s, v, touching, slow, round == IMPACT_ROUNDS, entering)) return OK;
-        if (impact(s, at, q, v, entering, round == IMPACT_ROUNDS, Lambda) != OK) return FAILED;
+        if (impact(s, at, q, v, entering, round == IMPACT_ROUNDS ? NULL : dead, Lambda) != OK) return FAILED;
         for (int c = 0; c < contacts; c++) {
             const double push = Lambda[system->contact[c]];
             if (!entering[c] || !(push > 0)) continue;

@@ -22,14 +22,15 @@ typedef struct {
 } Impulse;
 
 /* All impacts of an instant; v (nv) is replaced by the velocities after them.  `touching`: flags, the
- * contacts that an impact can reach; `slow` (m): speeds that count as none; `struck`: flags, set for the
- * contacts that took an impulse, which is in s->push.  FAILED: no velocities satisfy the contacts. */
-SHARED Status impacts(Solver *s, Instant at, const double *q, double *v, const int *touching,
-                      const double *slow, int *struck);
+ * contacts that an impact can reach; `slow` (m): speeds that count as none; `dead`: flags, contacts that do not rebound;
+ * `struck`: flags, set for the contacts that took an impulse, which is in s->push.  FAILED: no velocities satisfy the
+ * contacts. */
+SHARED Status impacts(Solver *s, Instant at, const double *q, double *v, const int *touching, const double *slow,
+                      const int *dead, int *struck);
 
-/* One impact on the contacts flagged in `entering`, approached or at rest, together; `plastic`: e = 0.
+/* One impact on the contacts flagged in `entering`, approached or at rest, together; `dead`: flags, those with e = 0; NULL: all.
  * Lambda (m): the impulses, 0 where a row did not act. */
-SHARED Status impact(Solver *s, Instant at, const double *q, double *v, const int *entering, int plastic,
+SHARED Status impact(Solver *s, Instant at, const double *q, double *v, const int *entering, const int *dead,
                      double *Lambda);
 
 /* A (count, count), symmetric to the bit: how a unit impulse on each of the rows moves them all, those that are

@@ -84,7 +84,7 @@ void solver_layout(Solver *s, Arena *saved, Arena *scratch, const System *system
     s->trial_modes = arena_take(scratch, (size_t)frictions, sizeof *s->trial_modes);
     s->work_friction = arena_doubles(scratch, some * (2 * frictions + 3 * width));
     s->iwork_friction = arena_ints(scratch, some * (4 * frictions + 2 * contacts));
-    s->iwork_events = arena_ints(scratch, 6 * contacts);
+    s->iwork_events = arena_ints(scratch, 8 * contacts);
     s->work_modes = arena_doubles(scratch, contacts == 0 && frictions == 0 ? 0 : m + nv);
     s->work_impact = arena_doubles(scratch, contacts == 0 ? 0 : impact_doubles(nv, m, contacts));
     s->iwork_impact = arena_ints(scratch, contacts == 0 ? 0 : impact_ints(m, contacts));

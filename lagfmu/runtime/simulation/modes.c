@@ -23,7 +23,9 @@ typedef struct {
     int *near;     /* an impact can reach it */
     int *struck;   /* it landed, or took an impulse, or others took its speed from it */
     int *touching; /* f and df/dt are zero: the accelerations decide */
-    int low;       /* 1: of some that touch df/dt is not zero, but too low for them to part */
+    int *low;      /* it touches, and df/dt is not zero, but too low for it to part; ... */
+    int any_low;   /* ... whether there is one */
+    int *dead;     /* it takes its impulse without a rebound, which would be too low */
 } Flags;
 
 /* Speeds (m) of the rows that count as none, of the G that was evaluated last. */
@@ -69,7 +71,7 @@ static Status strike_contacts(Solver *s, Instant at, const int *happened, Flags 
         const int k = s->system->contact[c];
         arrives[c] = x->near[c] && !s->state.closed[c] && mechanism_slip(&s->stepped, k, s->state.v) < -slow[k];
     }
-    if (impacts(s, at, s->state.q, s->state.v, x->near, slow, x->struck) != OK) return FAILED;
+    if (impacts(s, at, s->state.q, s->state.v, x->near, slow, x->dead, x->struck) != OK) return FAILED;
     for (int c = 0; c < contacts; c++) {
         if (x->struck[c]) x->departing[c] = 0;
         if (arrives[c] || (happened[c] && !s->state.closed[c])) x->struck[c] = 1;
@@ -90,7 +92,7 @@ static int find_low(Solver *s, const double *slow, const int *shut, Flags *x) {
         const double pull = b->gamma[k] - mechanism_row(b, k, b->vdot);
         if (!x->near[c] || !(shut[c] || x->struck[c]) || !(speed > slow[k])) continue;
         if (!(pull > 0 && speed * speed <= 2 * pull * s->state.gap[c])) continue;
-        x->closed[c] = x->touching[c] = any = 1;
+        x->closed[c] = x->touching[c] = x->low[c] = any = 1;
     }
     return any;
 }
@@ -100,7 +102,7 @@ static Status settle_modes(Solver *s, Instant at, Flags *x) {
     const System *system = s->system;
     const double *q = s->state.q, *v = s->state.v;
     double *slow = s->work_modes;
-    int *shut = s->iwork_events + 5 * system->contacts;
+    int *shut = s->iwork_events + 7 * system->contacts;
     memcpy(shut, x->closed, (size_t)system->contacts * sizeof *shut);
     if (mechanism_evaluate(&s->stepped, at, q, v) != OK) return FAILED;
     find_slow(s, slow);
@@ -112,9 +114,36 @@ static Status settle_modes(Solver *s, Instant at, Flags *x) {
     if (contacts_modes(s, at, q, v, x->closed, x->touching, x->departing) != OK) return FAILED;
     system_active(system, x->closed, s->active);
     if (mechanism_motion(&s->stepped, at, q, v, s->active) != OK) return FAILED;
-    x->low = find_low(s, slow, shut, x);
-    if (!x->low) return OK;
+    memset(x->low, 0, (size_t)system->contacts * sizeof *x->low);
+    x->any_low = find_low(s, slow, shut, x);
+    if (!x->any_low) return OK;
     return contacts_modes(s, at, q, v, x->closed, x->touching, x->departing);
+}
+
+/* What is too low to part after its impulse takes that without a rebound: in one impact with the others', so that the
+ * friction on it is that of the impulse that remains.  Returns whether there are more than before. */
+static int find_dead(const Solver *s, Flags *x) {
+    int more = 0;
+    for (int c = 0; c < s->system->contacts; c++) {
+        if (!x->low[c] || !(s->push[c] > 0) || x->dead[c]) continue;
+        x->dead[c] = more = 1;
+    }
+    return more;
+}
+
+/* Impacts of the velocities `arriving` (nv), and the modes after them. */
+static Status pass_contacts(Solver *s, Instant at, const int *happened, const double *arriving, Flags *x) {
+    const System *system = s->system;
+    const double lost = s->state.now.lost;
+    memset(x->dead, 0, (size_t)system->contacts * sizeof *x->dead);
+    do {
+        memcpy(s->state.v, arriving, (size_t)system->nv * sizeof *arriving);
+        memset(s->push, 0, (size_t)system->contacts * sizeof *s->push);
+        s->state.now.lost = lost;
+        if (find_near(s, at, happened, x) != OK || strike_contacts(s, at, happened, x) != OK) return FAILED;
+        if (settle_modes(s, at, x) != OK) return FAILED;
+    } while (x->any_low && find_dead(s, x));
+    return OK;
 }
 
 /* Rows that come back with a contact keep the offset f at which they do. */
@@ -154,13 +183,17 @@ Status modes_switch(Solver *s, const int *happened) {
     const int rubs = system->frictions > 0;
     double *arriving = s->work_modes + system->m;
     memcpy(arriving, s->state.v, (size_t)system->nv * sizeof *arriving);
-    memset(s->push, 0, (size_t)contacts * sizeof *s->push);
     int *flags = s->iwork_events;
-    Flags x = {flags, flags + contacts, flags + 2 * contacts, flags + 3 * contacts,
-               flags + 4 * contacts, 0};
-    if (find_near(s, at, happened, &x) != OK || strike_contacts(s, at, happened, &x) != OK) return FAILED;
-    if (settle_modes(s, at, &x) != OK || set_offsets(s, at, x.closed) != OK) return FAILED;
-    if (rubs && x.low) { /* what comes to rest may stick */
+    Flags x = {flags,
+               flags + contacts,
+               flags + 2 * contacts,
+               flags + 3 * contacts,
+               flags + 4 * contacts,
+               flags + 5 * contacts,
+               0,
+               flags + 6 * contacts};
+    if (pass_contacts(s, at, happened, arriving, &x) != OK || set_offsets(s, at, x.closed) != OK) return FAILED;
+    if (rubs && x.any_low) { /* what comes to rest may stick */
         system_active(system, x.closed, s->active);
         if (losses_project(s, at, 0) != OK) return FAILED;
     }

@@ -87,7 +87,7 @@ typedef struct Solver {
     StickSlip *trial_modes;    /* (frictions) of stick_slip.c, with */
     double *work_friction;     /* (2 frictions + 3 solver_width()) */
     int *iwork_friction;       /* (4 frictions + 2 contacts) */
-    int *iwork_events;         /* (6 contacts) of events.c and modes.c */
+    int *iwork_events;         /* (8 contacts) of events.c and modes.c */
     double *work_modes;        /* (m + nv) of modes.c */
     double *work_impact;       /* of impact.c, see there */
     int *iwork_impact;
