@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import math
+import random
 import zipfile
 from ctypes import byref, c_bool, c_char_p, c_double, c_int, c_size_t, c_uint32, c_void_p
 from xml.etree import ElementTree
@@ -244,3 +245,32 @@ def test_saved_states_of_another_fmu_are_refused(library3):
     assert "another FMU" in other.refuses("DeserializeFMUState", *arguments)
     exchange = library3("Hemisphere")(exchange=True).start()
     assert "other type" in exchange.refuses("SetFMUState", one.saved())
+
+
+@pytest.mark.parametrize("name", ["PendulumCartesian", "Gyroscope", "SliderCrankBodies"])
+def test_continuous_states_are_set_one_by_one(library3, name):
+    """In Continuous-Time Mode SetFloat64 of each state is SetContinuousStates of all (FMI 3.0.2, sect. 3.2.1),
+    in whatever order and number of calls, of quaternions too; in Event Mode those that no event changes."""
+    one, two = (library3(name)(exchange=True).start() for _ in range(2))
+    states = [u.variable.derivative.name for u in one.library.description.derivatives]
+    size = len(states)
+    begun = one.array("GetContinuousStates", size)
+    chance = random.Random(3)
+    for instance in (one, two):
+        assert not instance.updates()[0]
+        instance.does("EnterContinuousTimeMode")
+    for _ in range(3):
+        moved = [x + 1e-3 * chance.uniform(-1, 1) for x in begun]
+        one.does("SetContinuousStates", (c_double * size)(*moved), c_size_t(size))
+        for k in chance.sample(range(size), size):
+            two.set(states[k], moved[k])
+            assert two.get(states[k]) == moved[k]
+        found = [i.array("GetContinuousStateDerivatives", size) for i in (one, two)]
+        assert found[0] == found[1]
+        assert one.array("GetContinuousStates", size) == two.array("GetContinuousStates", size)
+        assert one.outputs() == two.outputs()
+    call, arguments = two.set_call(states[0], math.nan)
+    assert "expected a finite number" in two.refuses(call, *arguments)
+    two.does("EnterEventMode")
+    call, arguments = two.set_call(states[0], begun[0] + 1)
+    assert "before the end of the initialization" in two.refuses(call, *arguments)

@@ -63,6 +63,13 @@ int component_get(Component *c, const Call *call, const Group *group, const unsi
     return CALL_OK;
 }
 
+/* Whether the importer moves it by itself, at any time or, where no event does so, at an event (FMI 3.0.2, 3.2.1). */
+static int moves_alone(const Component *c, const Group *group, const Variable *v) {
+    const Instance *x = &c->instance;
+    if (!group->states || !x->exchange || instance_state(v) < 0) return 0;
+    return x->phase == CONTINUOUS || (x->phase == EVENT && MODEL_SYSTEM->m == 0);
+}
+
 int component_set(Component *c, const Call *call, const Group *group, const unsigned references[], size_t count,
                   const void *values) {
     if (component_forbids(c, call)) return CALL_ERROR;
@@ -71,12 +78,19 @@ int component_set(Component *c, const Call *call, const Group *group, const unsi
     for (size_t k = 0; k < count; k++) {
         const Variable *v = component_find(c, call, references[k], group);
         if (v == NULL) return CALL_ERROR;
-        if (instance_settable(&c->instance, v, number_at(group->form, values, k)) != OK)
+        const double value = number_at(group->form, values, k);
+        if (moves_alone(c, group, v) ? instance_state_settable(&c->instance, v, value) != OK
+                                  : instance_settable(&c->instance, v, value) != OK)
             return component_failed(c, CALL_ERROR);
     }
     for (size_t k = 0; k < count && c->instance.phase == BETWEEN; k++)
         c->instance.between.value[VARIABLES[references[k]].index] = number_at(group->form, values, k);
-    for (size_t k = 0; k < count && c->instance.phase != BETWEEN; k++)
-        instance_put(&c->instance, &VARIABLES[references[k]], number_at(group->form, values, k));
+    for (size_t k = 0; k < count && c->instance.phase != BETWEEN; k++) {
+        const Variable *v = &VARIABLES[references[k]];
+        const double value = number_at(group->form, values, k);
+        if (moves_alone(c, group, v)) instance_set_state(&c->instance, v, value);
+        else
+            instance_put(&c->instance, v, value);
+    }
     return CALL_OK;
 }

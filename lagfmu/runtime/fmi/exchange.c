@@ -61,7 +61,7 @@ Status exchange_set_states(Instance *x, const double *states) {
     for (int j = 0; j < nq; j++) s->state.q[j] = states[place_of(s->system, j)];
     for (int i = 0; i < nv; i++) s->state.v[i] = states[place_of(s->system, nq + i)];
     x->observed = x->evaluated = 0;
-    return mechanism_settle(&s->stepped, segment_instant(s, s->state.now.t), s->state.q);
+    return instance_settle_states(x);
 }
 
 /* Kinetic energy [J] of what moves through its size at the natural rate. */

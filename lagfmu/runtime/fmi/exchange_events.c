@@ -113,6 +113,7 @@ static Status judge_step(Instance *x, int *event) {
 }
 
 Status exchange_step_done(Instance *x, int *event) {
+    if (instance_start(x) != OK) return FAILED;
     if (judge_step(x, event) != OK) return FAILED;
     if (features_everywhere(&x->solver)) x->observed = x->evaluated = 0;
     FEATURES_DO(&x->solver, exchanged, &x->solver, event);

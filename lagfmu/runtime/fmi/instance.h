@@ -58,6 +58,7 @@ typedef struct Instance {
     double *multiplier;     /* (m) those that an importer has set */
     double *places;         /* (lookup_count) scratch */
     int observed, evaluated;
+    int unsettled;          /* 1: states were set one by one */
     int followed;           /* 1: the state goes with a motion that was set; as it was in `backup` */
     double *q0, *v0;        /* (nq), (nv) start values as they were set */
     double *joint0;         /* (2 joint_count) those of joint coordinates and their rates */
@@ -123,6 +124,15 @@ SHARED Status instance_steppable(Instance *x, double t, double h);
 
 /* The consistent start, unless it is known already. */
 SHARED Status instance_start(Instance *x);
+
+/* The place among (q, v, energy dissipated) of a variable that is a continuous state, or -1.  One that an importer's
+ * integrator sets alone (FAILED: it is not finite) is settled with the others when next something is read: quaternions
+ * are normalized, angles counted.  FAILED: one of them is no rotation. */
+SHARED int instance_state(const Variable *v);
+SHARED Status instance_state_settable(Instance *x, const Variable *v, double value);
+SHARED void instance_set_state(Instance *x, const Variable *v, double value);
+SHARED Status instance_settle_states(Instance *x);
+
 
 /* The start from the values that were set, with that of `state` (-1: none) moved by `part` as if it had been set. */
 SHARED Status instance_start_again(Instance *x, int state, double part);

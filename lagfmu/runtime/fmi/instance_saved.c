@@ -31,7 +31,7 @@ void instance_restore(Instance *x, const char *record) {
     s->stop_time = head.stop_time;
     INSTANCE_NUMBERS(PUT)
     if (ALGEBRAIC != NULL) ALGEBRAIC->apply(x);
-    x->observed = x->evaluated = x->followed = 0;
+    x->observed = x->evaluated = x->followed = x->unsettled = 0;
     if (ERROR_BARS != NULL) ERROR_BARS->restore(x);
 }
 
@@ -44,6 +44,7 @@ void instance_unfollow(Instance *x) {
 
 void instance_save(Instance *x, char *record) {
     instance_unfollow(x);
+    if (x->unsettled) (void)instance_settle_states(x);
     const Solver *s = &x->solver;
     Record head;
     memset(&head, 0, sizeof head);

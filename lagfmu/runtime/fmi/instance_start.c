@@ -153,7 +153,7 @@ static Status find_start(Instance *x) {
 
 Status instance_start(Instance *x) {
     Solver *s = &x->solver;
-    if (x->started) return OK;
+    if (x->started) return x->unsettled ? instance_settle_states(x) : OK;
     choose_settings(x);
     s->drive.since = x->start_time;
     find_priorities(x);

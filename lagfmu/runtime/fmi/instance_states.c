@@ -1,0 +1,32 @@
+/* instance_states.c -- continuous states that an importer's integrator sets one by one. */
+#include "instance.h"
+
+#include <math.h>
+
+#include "digits.h"
+#include "segment.h"
+
+int instance_state(const Variable *v) {
+    if (EXCHANGE_LOST && v->place == AT_LOST) return system_states(MODEL_SYSTEM);
+    return variable_state(v);
+}
+
+Status instance_state_settable(Instance *x, const Variable *v, double value) {
+    return isfinite(value) ? OK : fail(&x->solver.why, "'%s' = %s, expected a finite number", v->name, digits(value).text);
+}
+
+void instance_set_state(Instance *x, const Variable *v, double value) {
+    State *state = &x->solver.state;
+    const int j = instance_state(v), nq = x->solver.system->nq;
+    if (j == system_states(x->solver.system)) state->now.lost = value;
+    else
+        *(j < nq ? &state->q[j] : &state->v[j - nq]) = value;
+    x->observed = x->evaluated = 0;
+    x->unsettled = 1;
+}
+
+Status instance_settle_states(Instance *x) {
+    Solver *s = &x->solver;
+    x->unsettled = 0;
+    return mechanism_settle(&s->stepped, segment_instant(s, s->state.now.t), s->state.q);
+}
