@@ -249,8 +249,8 @@ def test_saved_states_of_another_fmu_are_refused(library3):
 
 @pytest.mark.parametrize("name", ["PendulumCartesian", "Gyroscope", "SliderCrankBodies"])
 def test_continuous_states_are_set_one_by_one(library3, name):
-    """In Continuous-Time Mode SetFloat64 of each state is SetContinuousStates of all (FMI 3.0.2, sect. 3.2.1),
-    in whatever order and number of calls, of quaternions too; in Event Mode those that no event changes."""
+    """In Continuous-Time Mode SetFloat64 of each state is SetContinuousStates of all (FMI 3.0.2, 3.2.1), in
+    whatever order and number of calls, of quaternions too; in Event Mode those that no event changes."""
     one, two = (library3(name)(exchange=True).start() for _ in range(2))
     states = [u.variable.derivative.name for u in one.library.description.derivatives]
     size = len(states)
