@@ -139,6 +139,7 @@ from .studio.tradeoff.setting import Setting
 from .verification.closed_forms import applies, check_closed_form, landed
 from .verification.evaluate import Compiled
 from .verification.exit_codes import EXIT_CODES, NOT_RUN, TERMINATED, WRONG_USAGE
+from .verification.laws import CarriedLaws
 from .verification.plot import COLOURS, figure_of, moments, panels
 from .verification.reference import read_table
 from .verification.simulate import ErrorBarWarning

@@ -16,6 +16,7 @@ from .body import Body, Ground
 from .check import problems_of, problems_of_containers
 from .draft import Draft
 from .joints import Gear, Joint
+from .laws import laws_of
 from .loads import Motor, Torsion
 from .picture import picture_of
 from .plane import PlaneMotion
@@ -94,6 +95,7 @@ def mechanism(
         outputs=[*draft.outputs, *outputs],
         descriptions={**descriptions, **{s: of.text for s, of in curves.items()}},
         parts=lines_of(bodies, parts),
+        laws=laws_of(draft, parts),
         **{"picture": picture_of(draft, parts), **more},
     )
     return model.started(*assemble(draft, model, parts, start or {}))

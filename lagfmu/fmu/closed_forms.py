@@ -18,10 +18,13 @@ from ..model.closed_form import ClosedForm, Conserved, in_variables, output
 from ..model.elements import Expr
 from ..model.expression import functions_of, read_formula, text_of
 from ..model.goal import parse
+from ..model.laws import Laws
 from ..model.scene import Scene
 from ..model.spline import Spline, splines_in
+from .laws import pack_laws, read_laws
 
 FORMAT = 1
+LAWS = "laws"
 LARGEST_RECORD = 1 << 24  # bytes
 EXPRESSIONS = ("actual", "expected", "scale", "when")
 CONDITIONS = ("while_closed", "while_open", "until_departure", "at_departure")
@@ -129,12 +132,14 @@ def pack_closed_forms(
     held: Collection[str] = (),
     tables: Sequence[Spline] = (),
     contacts: Collection[str] = (),
+    laws: Laws | None = None,
 ) -> bytes:
     """JSON with the closed forms; expressions are indexed symbols, so that any name can be read back.
 
     `numbers` are the values of parameters that the FMU does not have, `held` the contacts that stay
     closed, `contacts` those that may open, `tables` those that the model looks up, besides those of the
-    closed forms.  Those that need a variable which the scene leaves out are left out too, and counted.
+    closed forms, `laws` those of its bodies.  Those that need a variable which the scene leaves out are left
+    out too, and counted.
     Raises ModelError if one uses what no FMU of the model has.
     """
     known_of = carried(scene, closed_forms)
@@ -184,6 +189,8 @@ def pack_closed_forms(
     record: dict[str, Any] = {"format": FORMAT, "closed_forms": packed}
     if len(kept) < len(known_of):
         record["left_out"] = len(known_of) - len(kept)
+    if laws is not None:
+        record[LAWS] = pack_laws(laws, numbers or {})
     if tables:
         record["tables"] = [
             {"name": s.name, "x": s.x, "y": s.y, "ends": s.ends}
@@ -196,6 +203,18 @@ def pack_closed_forms(
 def left_out_of(content: bytes) -> int:
     """How many closed forms the scene leaves out, of a file that unpack_closed_forms() reads."""
     return int(json.loads(content).get("left_out", 0))
+
+
+def unpack_laws(content: bytes, name: str) -> Laws | None:
+    """The laws of bodies in an FMU, which unpack_closed_forms() reads; None without any.  Raises as that."""
+    data = json.loads(content)
+    if LAWS not in data:
+        return None
+    try:
+        tables = functions_of([_spline(entry) for entry in data.get("tables", [])])
+        return read_laws(data[LAWS], tables)
+    except (ValueError, RecursionError) as error:
+        raise _unreadable(name, error) from None
 
 
 def unpack_closed_forms(content: bytes, name: str) -> list[CarriedForm]:
@@ -217,10 +236,14 @@ def unpack_closed_forms(content: bytes, name: str) -> list[CarriedForm]:
         functions = functions_of([_spline(entry) for entry in data.get("tables", [])])
         return [_form(entry, functions) for entry in data["closed_forms"]]
     except (ValueError, RecursionError) as error:
-        raise VerificationError(
-            f"{name!r}: resources/lagfmu.json cannot be read ({error}); rebuild the FMU with this "
-            "version of lagfmu"
-        ) from None
+        raise _unreadable(name, error) from None
+
+
+def _unreadable(name: str, error: Exception) -> VerificationError:
+    return VerificationError(
+        f"{name!r}: resources/lagfmu.json cannot be read ({error}); rebuild the FMU with this "
+        "version of lagfmu"
+    )
 
 
 def _text(e: Expr, short_of: dict[Expr, str]) -> str:

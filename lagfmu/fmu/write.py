@@ -84,6 +84,7 @@ def write(
             prepared.held,
             prepared.model.splines,
             [c.name for c in prepared.equations.constraints if isinstance(c, Contact)],
+            prepared.model.laws,
         ),
     }
     extra[LICENSE] = license_of(target, sources).encode()

@@ -202,6 +202,7 @@ class ModelFields:
     parts: Sequence[
         tuple[str, str]
     ] = ()  # what it is made of, each with a line that says what it is
+    laws: Any = None  # the Laws of laws.py, of the bodies of a mechanism
 
     @property
     def directions(self) -> tuple[Expr, ...]:

@@ -15,7 +15,13 @@ from fmpy.validation import validate_fmu
 from .. import names
 from ..errors import SettingError, VerificationError
 from ..fmu.archive import opened
-from ..fmu.closed_forms import LARGEST_RECORD, CarriedForm, left_out_of, unpack_closed_forms
+from ..fmu.closed_forms import (
+    LARGEST_RECORD,
+    CarriedForm,
+    left_out_of,
+    unpack_closed_forms,
+    unpack_laws,
+)
 from ..fmu.read import Trajectory, experiment_of, kind_of, numbers_of, read_description
 from ..fmu.write import as_fmu
 from ..model.closed_form import ClosedForm, Conserved
@@ -23,6 +29,7 @@ from ..model.model import Model
 from ..model.scene import Scene
 from .check import Against, Check, Verification
 from .closed_forms import check_closed_form
+from .laws import CarriedLaws
 from .reference import Driven, Reference
 from .simulate import simulate, steps_of
 from .statements import read_statements
@@ -71,6 +78,12 @@ def verify(
             against += read_statements(Path(statements), description)
         ours = not against or is_ours(path)
         forms, left_out = (closed_forms_in(path), left_out_in(path)) if ours else ([], 0)
+        laws = laws_in(path, description) if ours else None
+        count = len(forms)
+        if laws is not None:
+            against.append(laws)
+            left_out += laws.left_out
+            count += 2 * len(laws.bodies)
         _check_texts(description, start_values or {})
         problems = validate_fmu(str(path))
         begun = time.perf_counter()
@@ -114,7 +127,7 @@ def verify(
         span,
         seconds,
         steps,
-        len(forms),
+        count,
         tuple(n for n in outputs if n not in said),
         left_out,
     )
@@ -159,6 +172,14 @@ def closed_forms_in(path: Path) -> list[CarriedForm]:
     if problems:
         raise VerificationError(f"{str(path)!r}: " + "; ".join(problems))
     return closed_forms
+
+
+def laws_in(path: Path, description: Any) -> CarriedLaws | None:
+    """The laws of the bodies of an FMU that closed_forms_in() reads; None if it is of no mechanism."""
+    with opened(path) as archive:
+        laws = unpack_laws(_record(archive), str(path))
+    known = {v.name for v in description.modelVariables}
+    return None if laws is None else CarriedLaws(laws, known)
 
 
 def left_out_in(path: Path) -> int:
