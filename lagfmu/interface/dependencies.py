@@ -68,17 +68,20 @@ class Dependencies:
         return found
 
     def group(self, *, speed: int | None = None, row: int | None = None) -> Names:
-        """Symbols behind the accelerations and multipliers that are solved together."""
+        """Symbols behind the accelerations and multipliers that are solved together; behind accelerations, as
+        an importer integrates them, also what leads back onto the rows."""
         of_speeds, of_rows = self._groups_of
         return of_rows[row] if speed is None and row is not None else of_speeds[speed]
 
     @cached_property
     def _groups_of(self) -> tuple[dict[int | None, Names], dict[int, Names]]:
-        groups = self.groups
-        return (
-            {i: symbols for speeds, _, symbols in groups for i in speeds},
-            {k: symbols for _, rows, symbols in groups for k in rows},
-        )
+        of_speeds: dict[int | None, Names] = {}
+        of_rows: dict[int, Names] = {}
+        for speeds, rows, symbols in self.groups:
+            of_rows |= dict.fromkeys(rows, symbols)
+            back = self.symbols(*(self.eom.f[k] for k in rows)).union(*map(self.rates, rows))
+            of_speeds |= dict.fromkeys(speeds, symbols | back)
+        return of_speeds, of_rows
 
     @cached_property
     def groups(self) -> list[tuple[frozenset[int], frozenset[int], Names]]:
@@ -89,6 +92,8 @@ class Dependencies:
             M = [m for (i, _), m in masses if i in speeds]
             G = [a for k in rows for a in self._rows[k].values()]
             rest = [eom.F[i] for i in speeds] + [eom.gamma[k] for k in rows]
+            held = {eom.constraints[k].name for k in rows}
+            rest += [e for law in eom.frictions if held & {*law.of} for e in law.expressions]
             found.append((speeds, rows, self.symbols(*M, *G, *rest)))
         return found
 
@@ -126,16 +131,24 @@ class Dependencies:
         return moved | {str(eom.q[j]) for j in settled}
 
     @cached_property
+    def _quaternions(self) -> list[Names]:
+        """The four parts of each."""
+        q = self.stepped.q
+        return [frozenset(str(q[j]) for j in places) for places in self.stepped.quaternions]
+
+    @cached_property
     def _angles(self) -> dict[str, Expr]:
         """What each angle that goes on over turns equals modulo 2 pi, by its name."""
         return {str(self.stepped.q[j]): e for j, e in self.stepped.unwrapped.items()}
 
     def at_points(self, symbols: Iterable[str]) -> tuple[str, ...]:
-        """Inputs, states and the time behind a value at a communication point."""
+        """Inputs, states and the time behind a value at a communication point: states that are set are
+        settled, so that each part of a quaternion is by all four."""
         asked = frozenset(symbols)
         if asked not in self._sorted_at_points:
-            settled = self.symbols(*(self._angles[name] for name in asked & self._angles.keys()))
-            known = {n for n in asked | settled if n in self.known or n == names.TIME}
+            behind = asked | self.symbols(*(self._angles[n] for n in asked & self._angles.keys()))
+            behind = behind.union(*(four for four in self._quaternions if four & behind))
+            known = {n for n in behind if n in self.known or n == names.TIME}
             self._sorted_at_points[asked] = self._sorted(known)
         return self._sorted_at_points[asked]
 

@@ -169,7 +169,7 @@ class Outputs:
             given=name in self.behind.given,
             unit=unit,
             derivative_of=derivative_of,
-            depends=(name,),
+            depends=self.behind.at_points({name}),
             depends_initially=self.behind.at_start([name]) if approx else (),
         )
 

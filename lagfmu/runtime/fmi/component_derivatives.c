@@ -14,6 +14,7 @@ static double *known_place(Instance *x, const Variable *v, double *dt) {
     Sensitivity *w = &x->solver.sensitivity;
     if (v->place == AT_TIME) return dt;
     if (v->place == AT_INPUT) return &w->du[v->index];
+    if (v->place == AT_LOST && EXCHANGE_LOST && x->exchange) return &x->dlost;
     if (v->place == AT_LAMBDA && x->imposed) return &w->dgiven[v->index];
     if (j < 0) return NULL;
     return j < nq ? &w->dq[j] : &w->dv[j - nq];
@@ -22,6 +23,7 @@ static double *known_place(Instance *x, const Variable *v, double *dt) {
 Direction component_no_direction(Component *c) {
     Sensitivity *w = &c->instance.solver.sensitivity;
     const System *s = MODEL_SYSTEM;
+    c->instance.dlost = 0;
     memset(w->dq, 0, (size_t)s->nq * sizeof *w->dq);
     memset(w->dv, 0, (size_t)s->nv * sizeof *w->dv);
     memset(w->du, 0, (size_t)s->inputs * sizeof *w->du);
@@ -48,6 +50,7 @@ void component_settle(Component *c, double dt) {
     const Sensitivity *w = &s->sensitivity;
     if (s->system->kinematics == NULL || s->system->kinematics_tangent == NULL) return;
     const Instant at = segment_instant(s, s->state.now.t);
+    for (int k = 0; k < 4 * s->system->quaternions; k++) w->dq[s->system->quaternion[k]] /= c->instance.norm[k / 4];
     KINEMATICS->settle_along(&s->stepped, at.t, s->state.q, at.u, at.p, dt, w->dq, w->du, w->dp);
 }
 

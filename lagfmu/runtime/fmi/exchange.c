@@ -7,7 +7,8 @@
  *
  * (Baumgarte 1972; the second where there is no f), with alpha of the order of the motion's own rate
  * (exchange_gain.c), so that nothing becomes stiff and the drift stays in proportion to the importer's
- * tolerance, whatever that is.  lambda, as it is read, is that of the unstabilized equations.  Where this does
+ * tolerance, whatever that is.  lambda, as it is read, is that of the unstabilized equations; accelerations, and all
+ * derivatives of these, are those that the importer integrates.  Where this does
  * not hold the drift (constraints that depend on each other) an event does (exchange_events.c).  Projection
  * alone would cost a restart of the importer's integrator each time. */
 #include "exchange.h"
@@ -20,6 +21,8 @@
 #include "optional.h"
 #include "schur.h"
 #include "segment.h"
+
+static const double DISPLACEMENT = 6e-6; /* of a size: the cube root of rounding */
 
 void exchange_begin(Instance *x) {
     memset(x->set, 0, (size_t)x->solver.system->inputs * sizeof *x->set);
@@ -112,22 +115,121 @@ Status exchange_multipliers(Instance *x) {
     return segment_motion_near(s, segment_instant(s, s->state.now.t), s->state.q, s->state.v);
 }
 
-/* Adds the accelerations that lead back onto the constraints. */
-static Status stabilize(Instance *x, double *derivatives) {
+/* What leads back in row k: of its slip and its f, or of their changes. */
+static double way_back(const Instance *x, int k, double slip, double f) {
+    const int by_rate = x->solver.system->rows[k].kind == NONHOLONOMIC;
+    return by_rate ? -x->gain * slip : -x->gain * (2 * slip + x->gain * f);
+}
+
+/* The accelerations a (nv) that lead back onto the constraints, and their multipliers mu (m), which may be NULL; by the
+ * factors of the motion that was found last. */
+static Status find_way_back(Instance *x, double *a, double *mu) {
     Solver *s = &x->solver;
     Mechanism *b = &s->stepped;
-    const double alpha = x->gain;
-    double *c = s->sensitivity.c, *a = s->sensitivity.dvdot;
-    if (!(alpha > 0)) return OK;
-    if (mechanism_residual(b, segment_instant(s, s->state.now.t), s->state.q, b->f) != OK)
-        return FAILED;
+    double *c = s->sensitivity.c;
+    memset(a, 0, (size_t)s->system->nv * sizeof *a);
+    if (mu != NULL) memset(mu, 0, (size_t)s->system->m * sizeof *mu);
+    if (!(x->gain > 0)) return OK;
+    if (mechanism_residual(b, segment_instant(s, s->state.now.t), s->state.q, b->f) != OK) return FAILED;
     for (int k = 0; k < s->system->m; k++)
-        c[k] = s->system->rows[k].kind == NONHOLONOMIC
-                   ? -alpha * mechanism_slip(b, k, s->state.v)
-                   : -alpha * (2 * mechanism_slip(b, k, s->state.v) + alpha * (b->f[k] - s->state.offset[k]));
-    if (linear_nearest(&b->linear, NULL, c, a, NULL) != OK) return OK; /* rows contradict each other */
-    for (int i = 0; i < s->system->nv; i++) derivatives[place_of(s->system, s->system->nq + i)] += a[i];
+        c[k] = way_back(x, k, mechanism_slip(b, k, s->state.v), b->f[k] - s->state.offset[k]);
+    if (linear_nearest(&b->linear, NULL, c, a, mu) != OK) /* rows contradict each other */
+        memset(a, 0, (size_t)s->system->nv * sizeof *a);
     return OK;
+}
+
+int exchange_leads_back(const Instance *x) {
+    return x->exchange && x->running && !x->imposed && x->solver.system->full == NULL && x->solver.system->m > 0;
+}
+
+Status exchange_lead_back(Instance *x) {
+    Solver *s = &x->solver;
+    double *a = s->sensitivity.dvdot;
+    x->evaluated = 0;
+    if (s->state.now.dependent && exchange_evaluate(x) != OK) return FAILED;
+    if (s->state.now.dependent) memcpy(x->seen.vdot, s->stepped.vdot, (size_t)s->system->nv * sizeof *a);
+    if (find_way_back(x, a, NULL) != OK) return FAILED;
+    for (int i = 0; i < x->solver.system->nv; i++) x->seen.vdot[i] += a[i];
+    return OK;
+}
+
+static int larger_of(int a, int b) { return a > b ? a : b; }
+
+/* The longest step along a direction that moves nothing by more than DISPLACEMENT of its size. */
+static double step_along(const Solver *s, Direction d) {
+    const System *system = s->system;
+    const double rate = s->state.now.rate > 0 ? s->state.now.rate : 1;
+    double most = fabs(d.dt) * rate;
+    for (int j = 0; j < system->nq; j++)
+        most = fmax(most, fabs(d.dq[j]) / (s->state.size[j] > 0 ? s->state.size[j] : 1));
+    for (int i = 0; i < system->nv; i++) {
+        const double size = fmax(s->state.span[i] * rate, fabs(s->state.v[i]));
+        most = fmax(most, fabs(d.dv[i]) / (size > 0 ? size : 1));
+    }
+    for (int k = 0; k < system->inputs; k++)
+        most = fmax(most, fabs(d.du[k]) / (s->drive.value[k] != 0 ? fabs(s->drive.value[k]) : 1));
+    return most > 0 ? DISPLACEMENT / most : 0;
+}
+
+/* vdot (nv), as it is integrated, h along a direction from the state; the state stays. */
+static Status find_beside(Instance *x, Direction d, double h, double *vdot) {
+    Solver *s = &x->solver;
+    const System *system = s->system;
+    const int nq = system->nq, nv = system->nv;
+    double *y = s->work_advance, *u = x->back + 3 * nv + system->m;
+    state_gather(system, s->state.q, s->state.v, y);
+    memcpy(u, s->drive.value, (size_t)system->inputs * sizeof *u);
+    for (int j = 0; j < nq; j++) s->state.q[j] += h * d.dq[j];
+    for (int i = 0; i < nv; i++) s->state.v[i] += h * d.dv[i];
+    for (int k = 0; k < system->inputs; k++) s->drive.value[k] += h * d.du[k];
+    s->state.now.t += h * d.dt;
+    x->evaluated = 0;
+    Status status = mechanism_settle(&s->stepped, segment_instant(s, s->state.now.t), s->state.q);
+    if (status == OK) status = exchange_evaluate(x);
+    if (status == OK) memcpy(vdot, s->stepped.vdot, (size_t)nv * sizeof *vdot);
+    if (status == OK) status = find_way_back(x, x->back, NULL);
+    for (int i = 0; i < nv && status == OK; i++) vdot[i] += x->back[i];
+    state_scatter(system, y, s->state.q, s->state.v);
+    memcpy(s->drive.value, u, (size_t)system->inputs * sizeof *u);
+    s->state.now.t -= h * d.dt;
+    x->evaluated = 0;
+    return status;
+}
+
+/* Where rows depend on each other what is solved off the constraints has no derivative in closed form: by central
+ * differences of the accelerations themselves. */
+static Status difference_along(Instance *x, Direction d, double *change) {
+    const int nv = x->solver.system->nv;
+    const double h = step_along(&x->solver, d);
+    double *before = x->back + nv;
+    memset(change, 0, (size_t)nv * sizeof *change);
+    if (!(h > 0)) return OK;
+    const double t = x->solver.state.now.t;
+    if (find_beside(x, d, -h, before) != OK || find_beside(x, d, h, change) != OK) return FAILED;
+    for (int i = 0; i < nv; i++) change[i] = (change[i] - before[i]) / (2 * h);
+    x->solver.state.now.t = t;
+    return OK;
+}
+
+Status exchange_differentiate(Instance *x, Direction d) {
+    Solver *s = &x->solver;
+    Mechanism *b = &s->stepped;
+    Sensitivity *w = &s->sensitivity;
+    const int nv = s->system->nv, m = s->system->m;
+    double *a = x->back, *mu = a + nv, *change = mu + larger_of(nv, m);
+    if (s->state.now.dependent) return difference_along(x, d, change);
+    if (find_way_back(x, a, mu) != OK) return FAILED;
+    for (int i = 0; i < nv; i++) b->vdot[i] += a[i];
+    for (int k = 0; k < m; k++) b->lambda[k] += mu[k];
+    sensitivity_sides(w, b, x->at, s->state.q, s->state.v, d);
+    for (int k = 0; k < m; k++)
+        w->c[k] += way_back(x, k, sensitivity_slip(w, b, k, s->state.v, d.dv), w->df[k]);
+    const Status solved = w->slide != NULL ? w->slide(w, b, x->at, s->state.q, s->state.v, d)
+                                           : linear_nearest(&b->linear, w->b, w->c, w->dvdot, NULL);
+    memcpy(change, w->dvdot, (size_t)nv * sizeof *change);
+    for (int i = 0; i < nv; i++) b->vdot[i] -= a[i];
+    for (int k = 0; k < m; k++) b->lambda[k] -= mu[k];
+    return solved;
 }
 
 Status exchange_derivatives(Instance *x, double *derivatives) {
@@ -140,7 +242,10 @@ Status exchange_derivatives(Instance *x, double *derivatives) {
     for (int j = 0; j < system->nq; j++) derivatives[place_of(system, j)] = rate[j];
     for (int i = 0; i < system->nv; i++) derivatives[place_of(system, system->nq + i)] = b->vdot[i];
     if (EXCHANGE_LOST) derivatives[system_states(system)] = OPTIONAL.friction->power(s);
-    return stabilize(x, derivatives);
+    if (find_way_back(x, s->sensitivity.dvdot, NULL) != OK) return FAILED;
+    for (int i = 0; i < system->nv; i++)
+        derivatives[place_of(system, system->nq + i)] += s->sensitivity.dvdot[i];
+    return OK;
 }
 
 Status exchange_indicators(Instance *x, double *indicators) {

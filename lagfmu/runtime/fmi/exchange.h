@@ -17,6 +17,16 @@ SHARED Status exchange_get_states(Instance *x, double *states);
 /* Quaternions in them are normalized.  FAILED: one of them is no rotation. */
 SHARED Status exchange_set_states(Instance *x, const double *states);
 SHARED Status exchange_derivatives(Instance *x, double *derivatives);
+
+/* Whether accelerations are those that lead back onto the constraints; these in x->seen; their changes along a direction
+ * in exchange_change_of_vdot(), by the factors of instance_factor(). */
+SHARED int exchange_leads_back(const Instance *x);
+SHARED Status exchange_lead_back(Instance *x);
+SHARED Status exchange_differentiate(Instance *x, Direction d);
+static inline double exchange_change_of_vdot(const Instance *x, int i) {
+    const System *s = x->solver.system;
+    return x->back[s->nv + (s->nv > s->m ? s->nv : s->m) + i];
+}
 SHARED Status exchange_indicators(Instance *x, double *indicators);
 SHARED Status exchange_nominals(Instance *x, double *nominals);
 

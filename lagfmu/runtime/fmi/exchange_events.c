@@ -197,6 +197,7 @@ static Status moving(Instance *x, Status (*act)(Instance *)) {
     const double lost = s->state.now.lost;
     x->observed = x->evaluated = 0;
     if (act(x) != OK) return FAILED;
+    instance_settled(x);
     state_gather(s->system, s->state.q, s->state.v, after);
     x->moved |= memcmp(before, after, (size_t)system_states(s->system) * sizeof *after) != 0;
     x->moved |= EXCHANGE_LOST && s->state.now.lost != lost;

@@ -12,6 +12,7 @@
 
 #include "dependencies.h"
 #include "digits.h"
+#include "exchange.h"
 #include "fmi3_component.h"
 
 static int count_columns(const System *s) { return 1 + s->nq + s->nv + s->inputs; }
@@ -204,6 +205,20 @@ static Status prepare_sum(Component3 *c, const Sum *sum, const Variable **undefi
     return full == NULL || full->dynamics == NULL ? OK : solve_back(sum, none, &c->full, &x->along, &s->full);
 }
 
+/* Accelerations that lead back onto the constraints: a directional derivative for each known. */
+static int leads_back(const Sum *sum) {
+    int any = 0;
+    for (size_t k = 0; k < sum->count; k++) any |= VARIABLES[sum->unknowns[k]].place == AT_VDOT;
+    return any && exchange_leads_back(sum->x);
+}
+
+static Status change_as_led_back(Component *c, const Sum *sum, Direction d, double *change) {
+    component_settle(c, d.dt);
+    if (instance_differentiate(sum->x, d) != OK) return FAILED;
+    *change = find_change(sum, d);
+    return OK;
+}
+
 FMI3(fmi3Status, fmi3GetAdjointDerivative)(fmi3Instance instance, const fmi3ValueReference unknowns[], size_t nUnknowns,
                                            const fmi3ValueReference knowns[], size_t nKnowns, const fmi3Float64 seed[],
                                            size_t nSeed, fmi3Float64 sensitivity[], size_t nSensitivity) {
@@ -228,7 +243,8 @@ FMI3(fmi3Status, fmi3GetAdjointDerivative)(fmi3Instance instance, const fmi3Valu
     if (prepare_sum(made, &sum, &undefined) != OK)
         return undefined != NULL ? component_no_derivative(c, call, undefined) : component_no_value(c);
     Direction d = component_no_direction(c);
-    const int grouped = COLUMN_GROUPS != NULL && !x->imposed && !is_mixed(&sum);
+    const int led_back = leads_back(&sum);
+    const int grouped = COLUMN_GROUPS != NULL && !x->imposed && !is_mixed(&sum) && !led_back;
     if (grouped) follow_groups(made, &d);
     for (size_t k = 0; k < nKnowns; k++) {
         double *change = component_known(c, call, &FLOAT64, knowns[k], 1, &d.dt);
@@ -237,7 +253,9 @@ FMI3(fmi3Status, fmi3GetAdjointDerivative)(fmi3Instance instance, const fmi3Valu
         if (!grouped) {
             d = component_no_direction(c);
             *change = 1;
-            if (change_along(made, &sum, d, &sensitivity[k]) != OK) return component_no_value(c);
+            const Status status = led_back ? change_as_led_back(c, &sum, d, &sensitivity[k])
+                                           : change_along(made, &sum, d, &sensitivity[k]);
+            if (status != OK) return component_no_value(c);
         }
         if (!isfinite(sensitivity[k])) return component_no_derivative(c, call, &VARIABLES[unknowns[0]]);
     }

@@ -41,6 +41,8 @@ void instance_layout(Instance *x, Arena *arena) {
         x->indicators = arena_doubles(&scratch, indicators_count(system));
         x->pull = arena_doubles(&scratch, system->contacts);
         observed_layout(&x->seen, &scratch, system);
+        x->back = arena_doubles(&scratch, 3 * system->nv + system->m + system->inputs);
+        x->norm = arena_doubles(&scratch, system->quaternions);
         x->places = arena_doubles(&scratch, system->lookup_count);
         if (system->full != NULL) sensitivity_layout(&x->along, &scratch, system->full);
         if (ERROR_BARS != NULL) ERROR_BARS->layout(x, &saved, &scratch);
@@ -70,7 +72,8 @@ void instance_reset(Instance *x) {
     x->given.method = (MethodName)DEFAULT_METHOD;
     x->solver.on_demand = 1;
     x->started = x->running = x->warned = x->moved = x->ticking = x->observed = x->evaluated = x->followed = 0;
-    x->imposed = 0;
+    x->imposed = x->unsettled = 0;
+    instance_settled(x);
     if (ALGEBRAIC != NULL) ALGEBRAIC->apply(x);
     memset(x->shared, 0, (size_t)x->solver.system->frictions * sizeof *x->shared);
     for (int k = 0; k < VARIABLE_COUNT; k++)

@@ -57,7 +57,11 @@ typedef struct Instance {
     Past *past;             /* (estimated_count of the system) */
     double *multiplier;     /* (m) those that an importer has set */
     double *places;         /* (lookup_count) scratch */
+    double *back;           /* (3 nv + m + inputs) of exchange.c: what leads back onto the constraints, and its change */
     int observed, evaluated;
+    double *norm;           /* (quaternions) of those that an importer has set, before they were settled */
+    int apart;              /* 1: along the direction accelerations change, but no multipliers satisfy all constraints */
+    double dlost;           /* of a direction: the change of the energy dissipated, where that is a state */
     int unsettled;          /* 1: states were set one by one */
     int followed;           /* 1: the state goes with a motion that was set; as it was in `backup` */
     double *q0, *v0;        /* (nq), (nv) start values as they were set */
@@ -132,6 +136,7 @@ SHARED int instance_state(const Variable *v);
 SHARED Status instance_state_settable(Instance *x, const Variable *v, double value);
 SHARED void instance_set_state(Instance *x, const Variable *v, double value);
 SHARED Status instance_settle_states(Instance *x);
+SHARED void instance_settled(Instance *x); /* the state was found here: its quaternions have the norm 1 */
 
 
 /* The start from the values that were set, with that of `state` (-1: none) moved by `part` as if it had been set. */

@@ -4,6 +4,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "exchange.h"
 #include "outputs.h"
 #include "prescribed.h"
 #include "segment.h"
@@ -55,7 +56,12 @@ Status instance_differentiate_factored(Instance *x, Direction d, Differentiate *
 }
 
 Status instance_differentiate(Instance *x, Direction d) {
-    return instance_factor(x) == OK ? instance_differentiate_factored(x, d, sensitivity_along) : FAILED;
+    x->apart = 0;
+    if (instance_factor(x) != OK) return FAILED;
+    if (!exchange_leads_back(x)) return instance_differentiate_factored(x, d, sensitivity_along);
+    if (exchange_differentiate(x, d) != OK || instance_factor(x) != OK) return FAILED;
+    x->apart = instance_differentiate_factored(x, d, sensitivity_along) != OK; /* dependent rows, off the constraints */
+    return OK;
 }
 
 #define CHANGES(place, value, it) case AT_##place: *change = it; break;
@@ -69,6 +75,15 @@ Status instance_change(const Instance *x, const Variable *v, Direction d, double
     const Observed *o = &x->seen;
     const int i = v->index;
     *change = 0;
+    if (v->place == AT_VDOT && exchange_leads_back(x)) {
+        *change = exchange_change_of_vdot(x, i);
+        return isfinite(*change) ? OK : FAILED;
+    }
+    if (x->apart && v->place != AT_Q && v->place != AT_V && v->place != AT_QDOT) return FAILED;
+    if (v->place == AT_LOST && EXCHANGE_LOST && x->exchange) {
+        *change = x->dlost;
+        return OK;
+    }
     switch (v->place) {
         PLACES_READY(CHANGES) PLACES_OBSERVED(CHANGES)
         case AT_RESIDUAL_RATE: *change = sensitivity_slip(w, b, i, o->v, dv); break;

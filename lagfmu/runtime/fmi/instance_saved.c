@@ -32,6 +32,7 @@ void instance_restore(Instance *x, const char *record) {
     INSTANCE_NUMBERS(PUT)
     if (ALGEBRAIC != NULL) ALGEBRAIC->apply(x);
     x->observed = x->evaluated = x->followed = x->unsettled = 0;
+    instance_settled(x);
     if (ERROR_BARS != NULL) ERROR_BARS->restore(x);
 }
 

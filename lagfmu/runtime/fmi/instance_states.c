@@ -25,8 +25,17 @@ void instance_set_state(Instance *x, const Variable *v, double value) {
     x->unsettled = 1;
 }
 
+void instance_settled(Instance *x) {
+    for (int k = 0; k < x->solver.system->quaternions; k++) x->norm[k] = 1;
+}
+
 Status instance_settle_states(Instance *x) {
     Solver *s = &x->solver;
     x->unsettled = 0;
+    for (int k = 0; k < s->system->quaternions; k++) {
+        const int *e = s->system->quaternion + 4 * k;
+        const double *q = s->state.q;
+        x->norm[k] = hypot(hypot(q[e[0]], q[e[1]]), hypot(q[e[2]], q[e[3]]));
+    }
     return mechanism_settle(&s->stepped, segment_instant(s, s->state.now.t), s->state.q);
 }

@@ -30,9 +30,12 @@ static Status follow(Instance *x) {
 Status instance_observe(Instance *x) {
     if (x->observed) return OK;
     if (instance_start(x) != OK || solver_arrive(&x->solver) != OK || follow(x) != OK) return FAILED;
+    const int leads_back = exchange_leads_back(x);
+    if (leads_back && x->gain < 0 && exchange_find_gain(x) != OK) return FAILED;
     if (solver_observe(&x->solver, &x->seen) != OK) return FAILED;
-    x->observed = 1;
     x->motion = x->solver.stepped.evaluations + x->solver.full.evaluations;
+    if (leads_back && exchange_lead_back(x) != OK) return FAILED;
+    x->observed = 1;
     x->evaluated = 0;
     if (DERIVATIVES != NULL) DERIVATIVES->observed(x);
     if (ERROR_BARS != NULL) x->bars->observed = 0;
