@@ -57,6 +57,7 @@ def _of_joint(joint: Joint, planar: bool) -> Iterator[str]:
         yield f"{what}: friction is given, but only {rubs} rub: leave it out"
     elif joint.friction is not None and joint.turns and not value_of(joint.radius):
         yield f"{what}: friction is given without the radius of the pin, expected radius=... in m"
+    yield from _of_constant(what, joint)
     if joint.length is not None and joint.friction is None:
         yield f"{what}: the length of its bearing is given, but no friction: give friction, or leave it out"
     elif joint.length is not None and (isinstance(joint, Planar) or (planar and joint.turns)):
@@ -72,6 +73,21 @@ def _of_joint(joint: Joint, planar: bool) -> Iterator[str]:
         yield f"{what}: limits are {limits!r}, expected the smallest and the largest value"
     elif all(map(is_number, limits)) and not float(limits[0]) < float(limits[1]):  # type: ignore[arg-type]
         yield f"{what}: limits are {limits!r}, expected the smaller value first, then a larger one"
+
+
+def _of_constant(what: str, joint: Joint) -> Iterator[str]:
+    """Its friction torque or force."""
+    if joint.constant is None:
+        return
+    word = f"friction_{'torque' if joint.turns else 'force'}"
+    if joint.friction is not None:
+        yield f"{what}: friction and {word} are given, expected one of them"
+    of = joint.constant if isinstance(joint.constant, tuple | list) else (joint.constant,)
+    numbers = [value_of(x) for x in of]
+    if len(of) not in (1, 2) or any(is_number(x) and float(x) < 0 for x in numbers):
+        yield f"{what}: {word} is {joint.constant!r}, expected one number of at least 0, or two"
+    elif all(map(is_number, numbers)) and float(numbers[0]) < float(numbers[-1]):
+        yield f"{what}: {word} is {joint.constant!r}, expected the static one, then a smaller kinetic one"
 
 
 def _of_curve(part: PointOnCurve, planar: bool) -> Iterator[str]:

@@ -73,6 +73,13 @@ class Joint:
         self.coordinate(draft, a, b, axis, wrench)
         if self.friction is not None:
             self.rub(draft, axis, wrench)
+        if self.constant is not None:
+            self.stick(draft, axis, wrench)
+
+    @property
+    def constant(self) -> Any:
+        """The torque or force of its friction, where no normal force makes it."""
+        return None
 
     def relative_pose(self, guess: Guess) -> Reach:
         """A rough place of the second marker in the first."""
@@ -151,18 +158,42 @@ class Joint:
         r = draft.number(
             self.radius, f"{self.name}.radius", "m", f"radius of the pin of {self.name}"
         )
-        rows = []
-        for measure in self.measures:
-            turns, of = measure.startswith("angle"), draft.relative[measure]
-            row = f"{self.name}.{'r' if turns else ''}{AXES[axis]}"
-            lever = r if turns and len(self.measures) > 1 else 1  # both rows are velocities
-            text = f"{self.name} does not {'turn' if turns else 'slide'}"
-            draft.constraints.append(Nonholonomic(row, lever * of.values[1], text))
-            (wrench.torque if turns else wrench.force)[axis] += lever * multiplier(row)
-            rows.append(row)
+        both = len(self.measures) > 1  # rows that are velocities
+        rows = [
+            self.along(
+                draft, axis, wrench, measure, r if both and measure.startswith("angle") else 1
+            )
+            for measure in self.measures
+        ]
         if len(rows) == 1 and self.turns:
             normal *= r
         draft.constraints.append(Friction(self.name, rows, normal, *coefficients))
+
+    def along(self, draft: Draft, axis: int, wrench: Wrench, measure: str, lever: Expr = 1) -> str:
+        """The row by which a motion that it leaves free sticks."""
+        turns, of = measure.startswith("angle"), draft.relative[measure]
+        row = f"{self.name}.{'r' if turns else ''}{AXES[axis]}"
+        text = f"{self.name} does not {'turn' if turns else 'slide'}"
+        draft.constraints.append(Nonholonomic(row, lever * of.values[1], text))
+        (wrench.torque if turns else wrench.force)[axis] += lever * multiplier(row)
+        return row
+
+    def stick(self, draft: Draft, axis: int, wrench: Wrench) -> None:
+        """|torque| or |force| is at most a limit of its own: dry friction of a gear, of a seal."""
+        (measure,) = self.measures
+        static, kinetic = (*_pair(self.constant), None)[:2]
+        kind, unit = ("torque", "N.m") if self.turns else ("force", "N")
+        name = f"{self.name}.friction_{kind}"
+        text = f"friction {kind} of {self.name}"
+        limit = draft.number(static, name, unit, text)
+        if limit == 0:
+            return
+        if kinetic is not None:
+            kinetic = (
+                draft.number(kinetic, f"{name}_kinetic", unit, f"{text} while it slips") / limit
+            )
+        row = self.along(draft, axis, wrench, measure)
+        draft.constraints.append(Friction(self.name, [row], limit=limit, kinetic=kinetic))
 
     def normal(self, draft: Draft, axis: int, wrench: Wrench) -> Expr:
         """N [N]: the norm of the force F across the axis a.  Of a bearing of length b the sum over its edges,
@@ -180,18 +211,40 @@ class Joint:
 
 @dataclass(frozen=True, eq=False)
 class Revolute(Joint):
-    """A hinge: the markers' origins coincide, the second turns about the axis (z) of the first."""
+    """A hinge: the markers' origins coincide, the second turns about the axis (z) of the first.
+
+    It sticks while it needs no more than a `friction_torque` [N.m], and slips with it, or, of two, with the
+    second.
+    """
+
+    friction_torque: Number | Sequence[Number] | None = None
 
     turns = "about"
+
+    @property
+    def constant(self) -> Any:
+        """The torque."""
+        return self.friction_torque
 
 
 @dataclass(frozen=True, eq=False)
 class Prismatic(Joint):
-    """A slide: the second marker moves along an axis of the first (in the plane x), parallel to it."""
+    """A slide: the second marker moves along an axis of the first (in the plane x), parallel to it.
+
+    It sticks while it needs no more than a `friction_force` [N], and slips with it, or, of two, with the
+    second.
+    """
+
+    friction_force: Number | Sequence[Number] | None = None
 
     usual = ("x", "z")
     possible = ("xy", "xyz")
     slides = "along"
+
+    @property
+    def constant(self) -> Any:
+        """The force."""
+        return self.friction_force
 
 
 @dataclass(frozen=True, eq=False)
@@ -387,6 +440,10 @@ def model_number(model: Model, value: Number) -> float:
     """A length as the model has it, in SI."""
     symbol = value.symbol if isinstance(value, Parameter) else value
     return float(sp.sympify(symbol).xreplace({p.symbol: p.value for p in model.parameters}))
+
+
+def _pair(values: Any) -> Sequence[Any]:
+    return values if isinstance(values, tuple | list) else (values,)
 
 
 def name_of_joint(joint: Any) -> str:

@@ -109,15 +109,23 @@ class Friction:
     (two constraints: orthogonal velocities).  `normal` [N] is linear in `multiplier(NAME)`s, or a sum of
     `norm`s of such; `static` and `kinetic` (the same as `static` if None) are numbers or expressions without
     dimension.  Where `of` is one angle, lambda is a torque [N.m], and the radius stands in the normal force
-    or in the coefficients.
+    or in the coefficients.  `limit` [N] or [N.m] in place of `normal` and `static` limits lambda itself: an
+    expression of parameters, coordinates, inputs and time; what slips does so with kinetic * |limit|.
     """
 
     name: str
     of: Sequence[str]
-    normal: Expr
-    static: Expr
+    normal: Expr = None
+    static: Expr = None
     kinetic: Expr = None
     description: str = ""
+    limit: Expr = None
+
+    def __post_init__(self) -> None:
+        """A limit is a normal force with the coefficient 1."""
+        if self.limit is not None and self.normal is self.static is None:
+            object.__setattr__(self, "normal", self.limit)
+            object.__setattr__(self, "static", sp.S.One)
 
     @property
     def sliding(self) -> Expr:

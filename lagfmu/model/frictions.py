@@ -1,7 +1,7 @@
 """What is wrong with the frictions of a model, in words.
 
 A friction limits the multipliers of one or two constraints, forces or one torque, by a normal force that is
-linear in multipliers of other constraints, or a sum of norms of such (norms.py).
+linear in multipliers of other constraints, or a sum of norms of such (norms.py); or by a limit of their own.
 """
 
 from __future__ import annotations
@@ -55,7 +55,17 @@ def check_kinds(model: ModelFields, problems: list[str]) -> None:
                 f"friction {f.name!r}: of = {f.of!r}, expected a list of constraint names, e.g. "
                 "of=['rolling']"
             )
-        for what, value in (("normal", f.normal), ("static", f.static), ("kinetic", f.sliding)):
+        if f.limit is not None and (f.normal is not f.limit or f.static != 1):
+            problems.append(
+                f"friction {f.name!r}: limit is given with normal or static, expected one of both: the limit "
+                "is the force or torque itself"
+            )
+            continue
+        for what, value in (
+            (_word(f), f.normal),
+            ("static", f.static),
+            ("kinetic", f.sliding),
+        ):
             is_text = isinstance(value, str)
             if is_text or not isinstance(sp.sympify(value, strict=False), sp.Expr):
                 problems.append(
@@ -66,6 +76,11 @@ def check_kinds(model: ModelFields, problems: list[str]) -> None:
             problems.append(
                 f"description of friction {f.name!r} is {f.description!r}, expected a text"
             )
+
+
+def _word(f: Friction) -> str:
+    """What the force or torque that limits it is called."""
+    return "normal" if f.limit is None else "limit"
 
 
 def check_frictions(
@@ -187,7 +202,7 @@ def _check_normal(
     """Of the normal force; returns the unit that a coefficient then needs: of the multiplier over the normal
     force's, of which the one or the other may be a torque."""
     normal = sp.sympify(f.normal)
-    what = f"normal of friction {f.name!r}"
+    what = f"{_word(f)} of friction {f.name!r}"
     rows = {multiplier(c.name): c for c in model.constraints}
     before = len(problems)
     for symbol in reactions_in(normal):
@@ -217,6 +232,10 @@ def _check_normal(
             f"{', '.join(map(repr, pushing))}, expected multipliers of joints: a contact pushes along its "
             "normal alone: make a friction of each contact"
         )
+    if f.limit is not None and present:
+        problems.append(
+            f"{what}: {plain(normal)} holds multipliers: give them as normal, with static"
+        )
     _check_symbols(model, what, normal, set(present), problems)
     limited = next((units[s] for s in map(multiplier, f.of) if s in units), NEWTON)
     if len(problems) > before:
@@ -225,6 +244,9 @@ def _check_normal(
         found = dimension_of(normal, units, what) or NEWTON
     except UnitError as error:
         problems.append(str(error))
+        return ONE
+    if f.limit is not None:
+        problems += check_dimension(normal, limited, units, what)
         return ONE
     if limited.same_dimension(TORQUE) and found.same_dimension(TORQUE):
         return ONE
