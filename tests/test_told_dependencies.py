@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import random
 from collections.abc import Iterator
-from ctypes import c_double, c_size_t
+from ctypes import c_bool, c_double, c_size_t
 from typing import Any
 
 import numpy as np
@@ -151,3 +151,67 @@ def test_nothing_begins_elsewhere_by_a_parameter_that_is_not_told(library: Any, 
             if u.dependencies is not None and known.name not in {v.name for v in u.dependencies}:
                 missing.add((u.variable.name, known.name))
     assert missing == set()
+
+
+def test_derivatives_during_the_initialization_are_those_of_the_start(library: Any) -> None:
+    """At rest lambda = m g cos theta on the hemisphere: d lambda/d theta = -m g sin theta, d lambda/d m =
+    g cos theta; with the speed w, d lambda/d w = -2 m a w.  What was set stays to the bit."""
+    one = library("Hemisphere")().initializing()
+    one.set("theta", 0.3)
+    one.set("der(theta)", 0.7)
+    m, g, a, w = (one.get(n) for n in ("m", "g", "a", "der(theta)"))
+    before = one.get("lambda.surface")
+    assert before == pytest.approx(m * (g * np.cos(0.3) - a * w**2))
+    expected = {
+        "theta": -m * g * np.sin(0.3),
+        "m": g * np.cos(0.3) - a * w**2,
+        "der(theta)": -2 * m * a * w,
+    }
+    for known, slope in expected.items():
+        (told,) = one.directional(["lambda.surface"], [known], [1.0])
+        assert told == pytest.approx(slope, rel=1e-9), known
+    (both,) = one.directional(["lambda.surface"], ["theta", "m"], [2.0, 3.0])
+    assert both == pytest.approx(2 * expected["theta"] + 3 * expected["m"], rel=1e-9)
+    assert one.get("lambda.surface") == before
+
+
+@pytest.mark.parametrize("name", ["SliderCrankBodies", "PendulumCartesian", "Loop"])
+def test_the_start_is_differentiated_through_its_projection(
+    library: Any, library3: Any, name: str
+) -> None:
+    """By each parameter all multipliers change as starts beside it do, by FMI 2.0 and, adjoint too, 3.0."""
+    of = library(name)
+    lam = [n for n in of.variables if n.startswith("lambda.")]
+    known = [
+        n
+        for n, v in of.variables.items()
+        if v.causality == "parameter" and v.type == "Real" and "solver" not in n
+    ]
+
+    def begun(**start: float) -> Any:
+        one = of().initializing()
+        for n, value in start.items():
+            one.set(n, value)
+        return np.array([one.get(n) for n in lam])
+
+    one, three = of().initializing(), library3(name)()
+    three.does(
+        "EnterInitializationMode",
+        c_bool(False),
+        c_double(0),
+        c_double(0),
+        c_bool(False),
+        c_double(0),
+    )
+    for n in known:
+        at = float(of.variables[n].start)
+        h = 1e-5 * (abs(at) or 1)
+        slopes = (begun(**{n: at + h}) - begun(**{n: at - h})) / (2 * h)
+        size = np.abs(slopes).max() + 1e-9 * np.abs(begun()).max() / (abs(at) or 1)
+        assert one.directional(lam, [n], [1.0]) == pytest.approx(
+            slopes.tolist(), abs=1e-5 * size + 1e-7
+        ), n
+        forward = three.derive("GetDirectionalDerivative", lam, [n], [1.0])
+        assert forward == pytest.approx(slopes.tolist(), abs=1e-5 * size + 1e-7), n
+        (adjoint,) = three.derive("GetAdjointDerivative", lam, [n], [1.0] * len(lam))
+        assert adjoint == pytest.approx(sum(forward), rel=1e-9, abs=1e-9 * size + 1e-9), n

@@ -85,7 +85,9 @@ SHARED int component_deserialize(Component *c, const Call *call, const char *byt
  * derivatives be had now, and are all arrays there; has a variable some; a direction in which so far nothing changes;
  * where a known's change stands in it (NULL: the log has why it is none); what is left of it once states are settled. */
 SHARED int component_derivable(Component *c, const Call *call, int complete);
-SHARED int component_has_derivatives(const Variable *v);
+static inline int component_has_derivatives(const Variable *v) {
+    return v->role == ROLE_OUTPUT || v->role == ROLE_START;
+}
 SHARED Direction component_no_direction(Component *c);
 SHARED double *component_known(Component *c, const Call *call, const Group *group, unsigned known, double change,
                                double *dt);
@@ -93,6 +95,10 @@ SHARED void component_settle(Component *c, double dt);
 SHARED int component_directional(Component *c, const Call *call, const Group *group, const unsigned unknowns[],
                                  size_t unknown_count, const unsigned knowns[], size_t known_count,
                                  const double seed[], double sensitivity[]);
+/* component_initial.c: in Initialization Mode, along changes of the knowns; with seeds of the unknowns of their sum alone. */
+SHARED int component_initial(Component *c, const Call *call, const Group *group, const unsigned unknowns[],
+                             size_t unknown_count, const double *seeds, const unsigned knowns[], size_t known_count,
+                             const double change[], double sums[]);
 SHARED int component_rates(Component *c, const Call *call, const Group *group, const unsigned references[],
                            size_t count, const int orders[], double values[]);
 

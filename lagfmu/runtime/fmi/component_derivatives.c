@@ -54,18 +54,8 @@ void component_settle(Component *c, double dt) {
     KINEMATICS->settle_along(&s->stepped, at.t, s->state.q, at.u, at.p, dt, w->dq, w->du, w->dp);
 }
 
-int component_has_derivatives(const Variable *v) {
-    return v->role == ROLE_OUTPUT || v->role == ROLE_START;
-}
-
 int component_derivable(Component *c, const Call *call, int complete) {
-    Why text;
     if (component_forbids(c, call)) return CALL_ERROR;
-    if (c->instance.phase == INITIALIZATION) {
-        (void)fail(&text, "%s: the start values pass through a projection whose derivative is not provided; ask "
-                   "after the initialization", call->name);
-        return component_refuse(c, text.text);
-    }
     return complete ? CALL_OK : component_missing(c, call);
 }
 
@@ -75,6 +65,8 @@ int component_directional(Component *c, const Call *call, const Group *group, co
     const int complete = (unknown_count == 0 || (unknowns != NULL && sensitivity != NULL)) &&
                          (known_count == 0 || (knowns != NULL && seed != NULL));
     if (component_derivable(c, call, complete) != CALL_OK) return CALL_ERROR;
+    if (c->instance.phase == INITIALIZATION)
+        return component_initial(c, call, group, unknowns, unknown_count, NULL, knowns, known_count, seed, sensitivity);
     Direction d = component_no_direction(c);
     for (size_t k = 0; k < known_count; k++) {
         double *change = component_known(c, call, group, knowns[k], seed[k], &d.dt);

@@ -236,6 +236,15 @@ FMI3(fmi3Status, fmi3GetAdjointDerivative)(fmi3Instance instance, const fmi3Valu
     Instance *x = &c->instance;
     const Sum sum = {x, unknowns, seed, nUnknowns};
     const Variable *undefined = NULL;
+    if (x->phase == INITIALIZATION) {
+        const double one = 1;
+        for (size_t k = 0; k < nKnowns; k++) {
+            const int status = component_initial(c, call, &FLOAT64, unknowns, nUnknowns, seed, &knowns[k], 1, &one,
+                                                 &sensitivity[k]);
+            if (status != CALL_OK) return status;
+        }
+        return fmi3OK;
+    }
     if (MODEL_SYSTEM->frictions > 0) {
         (void)fail(&x->solver.why, "this FMU has frictions, which have no adjoint");
         return component_no_value(c);

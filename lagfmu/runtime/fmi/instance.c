@@ -42,6 +42,7 @@ void instance_layout(Instance *x, Arena *arena) {
         x->pull = arena_doubles(&scratch, system->contacts);
         observed_layout(&x->seen, &scratch, system);
         x->back = arena_doubles(&scratch, 3 * system->nv + system->m + system->inputs);
+        x->set_before = arena_doubles(&scratch, VARIABLE_COUNT);
         x->norm = arena_doubles(&scratch, system->quaternions);
         x->places = arena_doubles(&scratch, system->lookup_count);
         if (system->full != NULL) sensitivity_layout(&x->along, &scratch, system->full);

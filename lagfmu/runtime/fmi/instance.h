@@ -59,6 +59,7 @@ typedef struct Instance {
     double *places;         /* (lookup_count) scratch */
     double *back;           /* (3 nv + m + inputs) of exchange.c: what leads back onto the constraints, and its change */
     int observed, evaluated;
+    double *set_before;     /* (VARIABLE_COUNT) of component_initial.c */
     double *norm;           /* (quaternions) of those that an importer has set, before they were settled */
     int apart;              /* 1: along the direction accelerations change, but no multipliers satisfy all constraints */
     double dlost;           /* of a direction: the change of the energy dissipated, where that is a state */
