@@ -1,4 +1,4 @@
-"""How a mechanism looks: its bodies, in space its joints and springs, and the forces of its joints."""
+"""How a mechanism looks: its bodies, its joints and loads, and the forces of its joints."""
 
 from __future__ import annotations
 
@@ -27,13 +27,14 @@ from ..model.picture import (
     Track,
 )
 from .body import Ground, Marker
+from .contacts import Contact
 from .curves import PointOnCurve
 from .draft import Draft
-from .joints import Distance, Joint, Universal
-from .loads import Gravity, SpringDamper
+from .joints import Distance, Gear, Joint, Rolling, Universal
+from .loads import Gravity, Motor, SpringDamper, Torsion
 from .motion import Motion, Placed
 from .solid import holds, solid
-from .vectors import AXES, Vector, plus, times
+from .vectors import AXES, Vector, dot, minus, plus, times
 
 CARRIED = (Box, Rod, Sphere, Disk, Line, Spring)
 LARGEST = 3.0  # times the farthest distance of a marker from its body's centre: the solid of a body
@@ -50,7 +51,11 @@ def picture_of(draft: Draft, parts: Sequence[Any]) -> list[Shape]:
     grounds = {id(m.body): m.body for m in draft.placed if isinstance(m.body, Ground)}
     shapes: list[Any] = []
     if planar:
-        shapes += map(Disk, _points(draft, markers[Ground()]))
+        surfaces = {id(p.first) for p in parts if isinstance(p, Contact | Rolling | PointOnCurve)}
+        held = [p for m, p in draft.placed.items() if id(m) not in surfaces]
+        shapes += map(Pivot, _points(draft, [p for p in held if isinstance(p.body, Ground)]))
+    for part in parts:
+        shapes += _touching(draft, part) if isinstance(part, Contact | Rolling) else []
     for body in (*grounds.values(), *(b for b in draft.motions if b != Ground())):
         motion = draft.motions[body]
         if body.shape is not None:
@@ -58,11 +63,11 @@ def picture_of(draft: Draft, parts: Sequence[Any]) -> list[Shape]:
         elif isinstance(body, Ground):
             continue
         elif planar:
-            shapes += _flat(_points(draft, markers[body]), _drawn(draft, motion.position))
+            shapes += _flat(draft, motion, markers[body])
         else:
             shapes += _in_space(draft, motion, markers[body], reach)
     for part in parts:
-        shapes += [] if planar else _of_part(draft, part)
+        shapes += _of_part(draft, part)
         shapes += [_curve(draft, part)] if isinstance(part, PointOnCurve) else []
     shapes += [Frame(_drawn(draft, p.point), _turn(draft, p)) for p in draft.readings.values()]
     for part in parts:
@@ -95,15 +100,45 @@ def _points(draft: Draft, markers: Sequence[Placed]) -> list[tuple[Any, ...]]:
     return list(dict.fromkeys(_drawn(draft, placed.point) for placed in markers))
 
 
-def _flat(ends: Sequence[Any], center: Any) -> Iterator[Shape]:
-    """A body of the plane by its markers."""
-    if len(ends) == 2:
-        yield Rod(*ends)
-    elif len(ends) > 2:
-        yield Line(*ends, ends[0])
-    elif ends and ends != [center]:
-        yield Rod(center, ends[0])
+def _flat(draft: Draft, motion: Motion, markers: Sequence[Placed]) -> Iterator[Shape]:
+    """A body of the plane by its markers, each place once: a rod, or where they are on no line their hull's
+    outline."""
+    places: dict[tuple[float, ...], tuple[Any, ...]] = {}
+    for placed in markers:
+        arm = tuple(round(_value(draft, x) or 0.0, 12) for x in placed.arm[:2])
+        places.setdefault(arm, _drawn(draft, placed.point))
+    center = _drawn(draft, motion.position)
+    if len(places) == 1 and (0.0, 0.0) not in places:
+        places[0.0, 0.0] = center
+    outline = _hull(sorted(places))
+    if len(outline) == 2:
+        yield Rod(*(places[arm] for arm in outline))
+    elif len(outline) > 2:
+        yield Line(*(places[arm] for arm in (*outline, outline[0])))
+    yield from (Pivot(at) for arm, at in places.items() if len(outline) > 2 or arm not in outline)
     yield Disk(center)
+
+
+def _hull(points: Sequence[tuple[float, ...]]) -> list[tuple[float, ...]]:
+    """Corners of the convex hull of sorted points, counterclockwise; both ends of points on a line."""
+
+    def half(way: Sequence[tuple[float, ...]]) -> list[tuple[float, ...]]:
+        found: list[tuple[float, ...]] = []
+        for p in way:
+            while len(found) > 1 and _turn_at(found[-2], found[-1], p) <= 0:
+                found.pop()
+            found.append(p)
+        return found[:-1]
+
+    return [*half(points), *half(points[::-1])] if len(points) > 1 else list(points)
+
+
+def _turn_at(a: Sequence[float], b: Sequence[float], c: Sequence[float]) -> float:
+    """Positive where a, b, c turn to the left by more than rounding, else 0 or less."""
+    u, v = np.subtract(b, a), np.subtract(c, b)
+    size = float(np.hypot(*u) * np.hypot(*v))
+    turn = float(u[0] * v[1] - u[1] * v[0])
+    return turn if abs(turn) > 1e-9 * size else 0.0
 
 
 def _value(draft: Draft, expression: Any) -> float | None:
@@ -174,35 +209,89 @@ def _turn(draft: Draft, placed: Placed) -> Any:
 
 
 def _of_part(draft: Draft, part: Any) -> Iterator[Shape]:
-    """A joint, a rod without mass, a spring, the direction of gravity, in space."""
+    """A joint, a rod without mass, a load; in space the direction of gravity."""
     if isinstance(part, Gravity):
-        yield Direction(part.name, _drawn(draft, draft.gravity[part.name]))
-    if not isinstance(part, Joint | Distance | SpringDamper):
-        return
-    first, second = draft.placed[part.first], draft.placed[part.second]
-    at, to = _drawn(draft, first.point), _drawn(draft, second.point)
-    if isinstance(part, Distance):
-        yield Rod(at, to)
+        if len(draft.components) == 3:
+            yield Direction(part.name, _drawn(draft, draft.gravity[part.name]))
+    elif isinstance(part, Distance):
+        yield Rod(*_ends(draft, part))
     elif isinstance(part, SpringDamper):
-        yield Spring(at, to)
+        yield Spring(
+            *_ends(draft, part), coils=8 if part.stiffness != 0 or part.preload != 0 else 0
+        )
     elif isinstance(part, Joint):
-        yield from _pivots(draft, part, first, second)
+        yield from _pivots(draft, part, draft.placed[part.first], draft.placed[part.second])
+    elif isinstance(part, Motor):
+        yield _about(draft, part.joint, "motor")
+    elif isinstance(part, Torsion):
+        yield from _elastic(draft, part)
+    elif isinstance(part, Gear):
+        yield from (_about(draft, joint, "gear") for joint in (part.first, part.second))
 
 
-def _pivots(draft: Draft, joint: Joint, first: Placed, second: Placed) -> Iterator[Pivot]:
-    """A pin about the axis of a hinge, a sleeve along that of a slide, a plate on a plane, else a ball."""
-    a = AXES.index(joint.axis or joint.usual[1])
+def _ends(draft: Draft, part: Any) -> tuple[Any, Any]:
+    """The points of both markers."""
+    first, second = draft.placed[part.first], draft.placed[part.second]
+    return _drawn(draft, first.point), _drawn(draft, second.point)
+
+
+def _along(draft: Draft, placed: Placed, axis: int) -> Any:
+    """An axis of a marker; in the plane its x axis for z, which is not seen."""
+    flat = len(draft.components) == 2 and axis == 2
+    return _drawn(draft, placed.axes[0 if flat else axis].value)
+
+
+def _about(draft: Draft, joint: Any, kind: str) -> Pivot:
+    """What drives a joint."""
+    of = draft.motion_of(joint)
+    return Pivot(_drawn(draft, of.second.point), _along(draft, of.first, of.axis), kind)
+
+
+def _elastic(draft: Draft, part: Torsion) -> Iterator[Shape]:
+    """About the axis of a hinge; in a slide between its markers."""
+    of = draft.motion_of(part.joint)
+    if of.unit == "rad":
+        yield _about(draft, part.joint, "torsion")
+        return
+    coils = 8 if part.stiffness != 0 or part.preload != 0 else 0
+    yield Spring(_drawn(draft, of.first.point), _drawn(draft, of.second.point), coils=coils)
+
+
+def _touching(draft: Draft, part: Contact | Rolling) -> Iterator[Shape]:
+    """A wheel or a ball, and below it what it stands on."""
+    a, b = draft.placed[part.first], draft.placed[part.second]
+    n = len(draft.components) - 1
+    normal, at = a.axes[n].value, b.point
+    d = minus(at, a.point)
+    foot = _drawn(draft, minus(at, times(dot(normal, d), normal)))
+    yield Pivot(foot, _drawn(draft, normal), "plate")
+    r = draft.number(part.radius, f"{part.name}.radius", "m")
+    if r != 0 and n == 1:
+        yield Disk(_drawn(draft, at), r, b.angle)
+    elif r != 0:
+        yield Sphere(_drawn(draft, at), r)
+
+
+def _pivots(draft: Draft, joint: Joint, first: Placed, second: Placed) -> Iterator[Shape]:
+    """A pin about the axis of a hinge, a sleeve along that of a slide and the way it has gone, a plate on a
+    plane, a cross where nothing is free, else a ball."""
+    planar = len(draft.components) == 2
+    a = AXES.index(joint.axis or joint.usual[0 if planar else 1])
     axis, other = _drawn(draft, first.axes[a].value), _drawn(draft, second.point)
     if isinstance(joint, Universal):
         b = AXES.index(joint.second_axis)
         yield Pivot(other, axis)
         yield Pivot(other, _drawn(draft, second.axes[b].value))
     elif joint.slides:
+        if joint.slides == "along":
+            yield Line(_drawn(draft, first.point), other)
         yield Pivot(other, axis, "sleeve" if joint.slides == "along" else "plate")
-    elif joint.turns == "about":
+    elif joint.turns == "about" and not planar:
         yield Pivot(other, axis)
     elif joint.turns:
         yield Pivot(other)
+    else:
+        yield Pivot(other, _along(draft, first, a), "weld")
 
 
 def _force(draft: Draft, part: Any) -> Arrow:

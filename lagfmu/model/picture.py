@@ -6,6 +6,7 @@ coordinates.  A shape may also hold velocities, inputs and `output(name)` of wha
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -55,7 +56,7 @@ class Rod(_Between):
 
 @dataclass(frozen=True)
 class Spring(_Between):
-    """A coil spring between two points."""
+    """A coil spring between two points; without `coils` a damper."""
 
     coils: int = 8
 
@@ -157,11 +158,21 @@ class Arrow:
 
 @dataclass(frozen=True)
 class Pivot:
-    """A joint, as large as the picture needs it: a ball, or along its `axis` a `kind` of PIVOTS."""
+    """A joint, as large as the picture needs it: a ball, or along its `axis` a `kind` of PIVOTS.
+
+    In the plane `strokes` say how it looks: lines of points along the axis and to its left, in half sizes.
+    """
 
     at: Point
     axis: Point | None = None
     kind: str = "pin"
+
+    @property
+    def strokes(self) -> list[list[tuple[float, float]]]:
+        """Of the kind, in the plane; none of a ball."""
+        if self.axis is None or len(self.at) != 2:
+            return []
+        return STROKES.get(self.kind, [])
 
 
 @dataclass(frozen=True)
@@ -177,7 +188,38 @@ Shape = (
 )
 SHAPES = (Line, Rod, Spring, Disk, Sphere, Box, Ground, Track, Pivot, Frame, Arrow, Direction)
 POINTS = ("center", "size", "point", "vector", "at", "axis", "along", "force")
-PIVOTS = ("pin", "sleeve", "plate")  # turns about its axis, slides along it, slides across it
+# turns about its axis, slides along it, slides across it, does not move; about it is what turns it
+PIVOTS = ("pin", "sleeve", "plate", "weld", "motor", "torsion", "gear")
+
+
+def _round(count: int, begin: float, end: float, *radii: float) -> list[tuple[float, float]]:
+    """Points about the origin, by turns, at one radius after the other."""
+    angles = [2 * math.pi * (begin + (end - begin) * k / count) for k in range(count + 1)]
+    return [
+        (radii[k % len(radii)] * math.cos(a), radii[k % len(radii)] * math.sin(a))
+        for k, a in enumerate(angles)
+    ]
+
+
+def _box(x: float, y: float) -> list[tuple[float, float]]:
+    return [(x, y), (-x, y), (-x, -y), (x, -y), (x, y)]
+
+
+STROKES: dict[str, list[list[tuple[float, float]]]] = {
+    "sleeve": [_box(1.3, 0.8), [(-2.2, 0), (2.2, 0)]],
+    "plate": [[(0, -2), (0, 2)], *([(0, y), (-0.6, y - 0.6)] for y in (-1.2, -0.4, 0.4, 1.2, 2.0))],
+    "weld": [_box(0.8, 0.8), [(0.8, 0.8), (-0.8, -0.8)], [(-0.8, 0.8), (0.8, -0.8)]],
+    "motor": [_round(30, 0.1, 0.9, 1.7), [(1.9, -0.4), (1.38, -1.0), (0.75, -0.65)]],
+    "torsion": [
+        [
+            (r * x, r * y)
+            for r, (x, y) in zip(
+                (0.4 + 0.025 * k for k in range(49)), _round(48, 0, 2.5, 1.0), strict=True
+            )
+        ]
+    ],
+    "gear": [_round(24, 0, 1, 1.6, 2.0)],
+}
 
 
 def points_of(shape: Shape) -> list[Point]:

@@ -40,13 +40,13 @@ FIELDS = {  # kind -> names of its points, lists of points, single expressions, 
     "ground": ((), ("points",), (), ()),
     "disk": (("center",), (), ("radius", "angle"), ("trace",)),
     "path": (("point",), (), (), ("over", "range")),
-    "pivot": (("at", "axis"), (), (), ("of",)),
+    "pivot": (("at", "axis"), (), (), ("of", "strokes")),
     "frame": (("at",), ("axes",), (), ()),
     "arrow": (("at", "vector"), (), (), ("name",)),
     "direction": (("vector",), (), (), ("name",)),
 }
 KINDS = {Sphere: "disk", Track: "path"}  # others are called as their class
-OPTIONAL = ("length", "radius", "angle", "axis", "coils", "trace")
+OPTIONAL = ("length", "radius", "angle", "axis", "coils", "trace", "strokes")
 IN_FMU = "resources/picture.json"
 
 
@@ -103,6 +103,10 @@ def _packed(model: Model, shape: Shape, numbers: Mapping[str, Any]) -> dict[str,
             found |= {"trace": True} if shape.trace else {}
         case Pivot():
             found["of"] = "ball" if shape.axis is None else shape.kind
+            if shape.strokes:
+                found["strokes"] = [
+                    [[round(x, 3) for x in p] for p in line] for line in shape.strokes
+                ]
         case Direction():
             found["name"] = shape.name
         case Arrow():
@@ -194,7 +198,9 @@ def _checked_shape(shape: Mapping[str, Any]) -> dict[str, Any]:
         elif key == "of":
             value = _one_of(value, ("ball", *PIVOTS))
         elif key == "coils":
-            value = min(max(int(value), 1), 100)
+            value = min(max(int(value), 0), 100)
+        elif key == "strokes":
+            value = [[[float(x), float(y)] for x, y in line] for line in value]
         else:
             value = bool(value)
         found[key] = value

@@ -18,6 +18,15 @@ LETTER, LINE = 7.5, 15  # pixels at 100 a inch, of a label
 TINY = 1e-300  # N
 SPAN = 0.08  # of what moves: an axis of a frame
 PIVOT = 0.025  # of what moves: half the length of a joint's axis
+LEAST = 5  # pixels: half the size of a joint of the plane
+
+# a damper: parts of its length, and to its side (so in web/flat.js)
+DASHPOT = np.array(
+    [
+        *([0.3, 0], [0.3, 1], [0.7, 1], [0.7, -1], [0.3, -1], [0.3, 1]),
+        *([0.5, 1], [0.5, -1], [0.5, 1], [0.7, 1], [0.7, 0]),
+    ]
+)
 
 
 class View:
@@ -85,9 +94,7 @@ class View:
         if shape.facets:
             _solid(axes, shape, k)
         elif shape.kind == "pivot":
-            way = np.zeros(2) if shape.axis is None else PIVOT * self.size * shape.axis[k]
-            ends = np.array([path[0] - way, path[0] + way])
-            axes.plot(*ends.T, color=BOB, lw=4, solid_capstyle="round")
+            self._pivot(axes, shape, k, path[0])
         elif shape.kind == "frame":
             for axis, colour in zip(shape.frame, FRAME, strict=False):
                 ends = np.array([path[0], path[0] + SPAN * self.size * axis[k]])
@@ -117,6 +124,20 @@ class View:
                     axes.plot(*np.array([path[0], spoke]).T, color=INK, lw=1.3)
         elif shape.force is not None:
             self._arrow(axes, shape, k, shape.force[k])
+
+    def _pivot(self, axes: Any, shape: Moving, k: int, at: Array) -> None:
+        """A joint: a ball, its axis, or in the plane the strokes of its kind."""
+        if shape.axis is None:
+            axes.plot(*at, "o", color="white", mec=INK, ms=4)
+        elif "strokes" in shape.shape:
+            pixel = (self.high[0] - self.low[0]) / axes.bbox.width
+            x, y = max(PIVOT * self.size, LEAST * pixel) * shape.axis[k]
+            turn = np.array([[x, y], [-y, x]])  # rows: a half size along the axis, and to its left
+            for stroke in shape.shape["strokes"]:
+                axes.plot(*(at + np.array(stroke) @ turn).T, color=BOB, lw=1.3)
+        else:
+            way = PIVOT * self.size * shape.axis[k]
+            axes.plot(*np.array([at - way, at + way]).T, color=BOB, lw=4, solid_capstyle="round")
 
     def _arrow(self, axes: Any, shape: Moving, k: int, force: Array) -> None:
         at = shape.points[0][k]
@@ -202,7 +223,9 @@ def _coil(a: Array, b: Array, coils: int, width: float) -> Array:
     along = b - a
     across = np.array([-along[1], along[0]]) / (np.hypot(*along) or 1.0) * width
     parts = np.linspace(0.12, 0.88, 2 * coils + 1)
-    sides = [0, *(1 if k % 2 else -1 for k in range(1, 2 * coils)), 0]
+    sides: Any = [0, *(1 if k % 2 else -1 for k in range(1, 2 * coils)), 0]
+    if not coils:
+        parts, sides = DASHPOT.T
     middle = [a + p * along + s * across for p, s in zip(parts, sides, strict=True)]
     return np.array([a, *middle, b])
 

@@ -6,6 +6,8 @@ const HANGING = 24; // pieces of a slack string
 const HALVINGS = 20; // until its length is found, to a millionth
 const FRAME = 18; // CSS pixels: an axis
 const PIVOT = 7; // half the length of a joint's axis
+// a damper: parts of its length, and to its side (so in studio/live/view.py)
+const DASHPOT = [[0.3, 0], [0.3, 1], [0.7, 1], [0.7, -1], [0.3, -1], [0.3, 1], [0.5, 1], [0.5, -1], [0.5, 1], [0.7, 1], [0.7, 0]];
 
 function svg(tag, attributes = {}) {
   const made = document.createElementNS(SVG, tag);
@@ -55,7 +57,8 @@ const SHAPES = {
       const [nx, ny] = [(-dy / length) * 6, (dx / length) * 6];
       const turns = 2 * s.coils;
       const found = [a];
-      for (let k = 0; k <= turns; k++) {
+      for (const [part, side] of turns ? [] : DASHPOT) found.push([a[0] + part * dx + side * nx, a[1] + part * dy + side * ny]);
+      for (let k = 0; turns && k <= turns; k++) {
         const part = 0.12 + (0.76 * k) / turns;
         const side = k === 0 || k === turns ? 0 : k % 2 ? 1 : -1;
         found.push([a[0] + part * dx + side * nx, a[1] + part * dy + side * ny]);
@@ -95,12 +98,21 @@ const SHAPES = {
   },
   pivot: {
     make: (s) => [
-      isLong(s) ? svg("line", { class: "pivot" }) : svg("circle", { class: "joint", r: 4 }),
+      s.strokes
+        ? svg("path", { class: "mark" })
+        : isLong(s)
+          ? svg("line", { class: "pivot" })
+          : svg("circle", { class: "joint", r: 4 }),
     ],
     points: (s, look) => [s.at(look)],
     draw([mark], s, look, view) {
       const at = view.screen(s.at(look));
-      if (isLong(s)) {
+      if (s.strokes) {
+        const axis = s.axis(look);
+        const [x, y] = axis.map((c) => (c * PIVOT) / (Math.hypot(...axis) || 1));
+        const place = ([u, v]) => [at[0] + u * x - v * y, at[1] - u * y - v * x];
+        mark.setAttribute("d", s.strokes.map((line) => `M${pointsOf(line.map(place))}`).join(""));
+      } else if (isLong(s)) {
         const [x, y] = view.flat(s.axis(look)).map((c) => c * PIVOT);
         setLine(mark, [at[0] - x, at[1] + y], [at[0] + x, at[1] - y]);
       } else setCenter(mark, at);

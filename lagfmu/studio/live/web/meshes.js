@@ -6,7 +6,7 @@ const THICK = 0.011; // of the mechanism's size: a rod without a radius, others 
 const SPAN = 0.1; // of the size: an axis of a frame
 
 /* Of joints, of that thickness: across their axis and along it. */
-const PIVOTS = { ball: [1.8, 1.8], pin: [1.4, 7], sleeve: [4, 7], plate: [5, 0.6] };
+const PIVOTS = { ball: [1.8, 1.8], pin: [1.4, 7], sleeve: [4, 7], plate: [5, 0.6], weld: [3, 3], motor: [4, 2.5], torsion: [3, 1.2], gear: [6, 0.8] };
 
 const sub = (a, b) => a.map((x, i) => x - b[i]);
 const scaled = (a, f) => a.map((x) => x * f);
@@ -57,17 +57,18 @@ const SOLIDS = {
       const [a, b] = s.points.map((p) => p(look));
       const way = sub(b, a);
       const [u, v] = squareTo(unitOf(way));
+      const r = 2 * THICK * size;
+      if (!s.coils) return bend(line, [a, ...DASHPOT.map(([part, side]) => along(a, [way, u], part, r * side)), b]);
       const count = 16 * s.coils;
       const coil = Array.from({ length: count + 1 }, (_, k) => {
         const angle = (2 * Math.PI * s.coils * k) / count;
-        const r = 2 * THICK * size;
         return along(a, [way, u, v], 0.1 + (0.8 * k) / count, r * Math.cos(angle), r * Math.sin(angle));
       });
       bend(line, [a, ...coil, b]);
     },
   },
   pivot: {
-    make: (kit, s) => kit.veiled({ ball: "ball", sleeve: "box" }[s.of] || "rod", "accent"),
+    make: (kit, s) => kit.veiled({ ball: "ball", sleeve: "box", weld: "box" }[s.of] || "rod", "accent"),
     place(marks, s, look, size) {
       const at = s.at(look);
       const axis = s.axis ? unitOf(s.axis(look)) : [0, 0, 1];
