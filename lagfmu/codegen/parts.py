@@ -171,11 +171,27 @@ class Parts:
         return Dimensions(places, speeds, parameters, number.get(ONE.exponents, -1))
 
     @cached_property
-    def folded(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """The largest parameter that is a number in the code, of each coordinate's dimension and of each
-        speed's times a second."""
-        places, speeds = (tuple(map(self.eom.folded, group)) for group in self.spans)
-        return places, speeds
+    def speed_folded(self) -> tuple[float, ...]:
+        """The largest parameter that is a number in the code, of each speed's dimension times a second."""
+        return tuple(map(self.eom.folded, self.spans[1]))
+
+    @cached_property
+    def extents(self) -> tuple[tuple[tuple[int, ...], ...], tuple[float, ...]]:
+        """Of each coordinate the parameters of its dimension that stand in its rows, and the largest of
+        those that are numbers in the code."""
+        eom, units = self.eom, self.eom.units
+        place = {str(p): i for i, p in enumerate(eom.p)}
+        numbers = {str(p): abs(float(x)) for p, x in eom.numbers.items()}
+        own, folded = [], []
+        for q, unit in zip(map(str, eom.q), self.spans[0], strict=True):
+            alike = [
+                name
+                for name in sorted(eom.standing.get(q, ()))
+                if not unit.dimensionless and units[name].exponents == unit.exponents
+            ]
+            own.append(tuple(place[name] for name in alike if name in place))
+            folded.append(max((numbers[name] for name in alike if name in numbers), default=0.0))
+        return tuple(own), tuple(folded)
 
     @cached_property
     def formulas(self) -> dict[int, Expr]:
@@ -270,6 +286,12 @@ class Parts:
             names = [str(s) for s in (*eom.q, *eom.v)]
             w = values([*self.formulas.values()], [names[j] for j in self.formulas])
             found.append(Function("starts", text, {"p": eom.p}, {"w": w}))
+        if any(x.expression != 0 for x in groups["f"]) and not eom.bare:
+            text = "The largest magnitude among the terms of each f: of what f is rounding."
+            terms = values(
+                [magnitude(x.expression) for x in groups["f"]], [x.place for x in groups["f"]]
+            )
+            found.append(Function("terms", text, still, {"term": terms}))
         if eom.sides and not eom.bare:
             text = "Positive where joints are not turned over: products of axes vanish at half a turn too."
             names = [self.constraints[k].name for k in eom.sides]
@@ -378,6 +400,25 @@ class Parts:
             for a, group in results.items()
         }
         return Function(name, doc, {**arguments, **along}, changes)
+
+
+def magnitude(e: Expr) -> Expr:
+    """The largest magnitude among the terms of which e is made, those of its factors with them; a sine
+    or cosine stands beside 1."""
+    if isinstance(e, sp.Add):
+        return _largest([magnitude(a) for a in e.args])
+    if isinstance(e, sp.Mul):
+        return sp.Mul(*map(magnitude, e.args))
+    if isinstance(e, sp.Pow) and e.exp.is_positive and e.exp.is_number:
+        return sp.Pow(magnitude(e.base), e.exp)
+    if isinstance(e, (sp.sin, sp.cos)):
+        return sp.S.One
+    return sp.Abs(e)
+
+
+def _largest(magnitudes: Sequence[Expr]) -> Expr:
+    different = list(dict.fromkeys(magnitudes))
+    return different[0] if len(different) == 1 else sp.Max(*different, evaluate=False)
 
 
 def _or_zero(expressions: Any) -> list[Expr]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import sympy as sp
 
@@ -40,7 +41,8 @@ class EquationsOfMotion(Displayed):
     there, `numbers` are the values of the parameters and inputs that were folded in, and `bare`
     equations are of coordinates that are only read: nothing is solved for them.  `switch_states`: where
     forces jump, the symbols behind the inputs that say on which side (jumps.py).  `frictions` say which
-    constraints hold only as long as their multipliers stay below a part of a normal force.
+    constraints hold only as long as their multipliers stay below a part of a normal force; `told`: `standing`
+    before parameters became numbers.
     """
 
     model: Model
@@ -65,6 +67,7 @@ class EquationsOfMotion(Displayed):
     numbers: Mapping[Expr, Expr] = field(default_factory=dict)
     bare: bool = False
     switch_states: tuple[Expr, ...] = ()
+    told: Mapping[str, frozenset[str]] | None = None
 
     def multipliers(self) -> dict[str, Expr]:
         """Constraint -> lambda in q, v, t and parameters [J/[f]; W/[expression] if nonholonomic].
@@ -80,6 +83,31 @@ class EquationsOfMotion(Displayed):
     def driven(self) -> tuple[Expr, ...]:
         """What the argument u of numeric functions holds: the inputs, then the switch states."""
         return (*self.u, *self.switch_states)
+
+    @cached_property
+    def standing(self) -> Mapping[str, frozenset[str]]:
+        """The parameters that stand in the rows of each coordinate: of the constraints and, where each
+        rate is a speed, of M; by names, as they were before any became numbers."""
+        if self.told is not None:
+            return self.told
+        parameters = {p: str(p) for p in self.p}
+        found: dict[str, set[str]] = {str(q): set() for q in self.q}
+        G = self.G.todok()
+        rows: dict[int, list[Any]] = {k: [] if f is None else [f] for k, f in enumerate(self.f)}
+        moved: dict[int, set[str]] = {}
+        for (k, j), value in G.items():
+            rows.setdefault(k, []).append(value)
+            if self.moves_plainly:
+                moved.setdefault(k, set()).add(str(self.q[j]))
+        for k, expressions in rows.items():
+            symbols = set().union(*(sp.sympify(e).free_symbols for e in expressions))
+            names = {parameters[s] for s in symbols if s in parameters}
+            for q in moved.get(k, set()) | {str(s) for s in symbols if str(s) in found}:
+                found[q] |= names
+        for (i, _), value in self.M.todok().items() if self.moves_plainly else ():
+            names = {parameters[s] for s in value.free_symbols if s in parameters}
+            found[str(self.q[i])] |= names
+        return {q: frozenset(names) for q, names in found.items()}
 
     @property
     def nq(self) -> int:

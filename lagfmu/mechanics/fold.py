@@ -72,6 +72,7 @@ def folded(eom: EquationsOfMotion, numbers: Mapping[Expr, Expr]) -> EquationsOfM
         p=tuple(s for s in eom.p if s not in numbers),
         rates={s: r for s, r in eom.rates.items() if s not in numbers},
         numbers={**eom.numbers, **numbers},
+        told=eom.standing,
     )
     flat = made.solved + [o.expression for o in made.outputs if o.otherwise is None]
     if any(e.has(sp.zoo, sp.oo, sp.nan) for e in flat):

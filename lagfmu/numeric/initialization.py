@@ -149,10 +149,10 @@ def _newton(
     for _ in range(INITIAL_ITERATIONS):
         M, _, G, _, _ = at.equations(q, v0)
         G = G[fixed]
-        span = in_speeds(at.system, at.p, np.maximum(np.abs(q), least))
+        span = in_speeds(at.system, np.maximum(np.abs(q), least))
         if (np.abs(f) <= 4 * EPS * (np.abs(G) @ span)).all():
             return q, np.zeros(len(fixed))
-        reach = np.abs(G) @ in_speeds(at.system, at.p, np.maximum(np.abs(q), size))
+        reach = np.abs(G) @ in_speeds(at.system, np.maximum(np.abs(q), size))
         unit = np.where(reach > 0, reach, np.where(f != 0, np.abs(f), 1.0))
         rounding = np.abs(f) <= 1e3 * EPS * reach
         left = np.where(rounding, 0.0, f)

@@ -36,6 +36,16 @@ class Instant:
         f = evaluated("the constraints", self.t, self.system.residual, *arguments)
         return np.array(f, dtype=float)
 
+    def terms(self, q: Vector) -> Vector:
+        """(m): the largest magnitude among the terms of each f, of which f is rounding; 0 without f."""
+        if self.system.terms is None:
+            return np.zeros(self.system.m)
+        arguments = self.t, q.tolist(), self.u, self.p
+        found = np.array(
+            evaluated("the constraints", self.t, self.system.terms, *arguments), dtype=float
+        )
+        return np.where(np.isfinite(found), found, 0.0)
+
     def moved(self, q: Vector, w: Vector) -> Vector:
         """q (nq) after a displacement w (nv) in speeds.  Raises likewise."""
         arguments = self.t, q, w, self.u, self.p

@@ -1,13 +1,15 @@
 """Nominals: the size of each coordinate, and the natural rate of the motion, at the start.  No unit counts.
 
-    size   of a coordinate: |q|, or the largest parameter of its dimension; of angles at most 1 rad
-    rate   [1/s] of the motion: the largest |v| / size and sqrt(|vdot| / size)
+    size   of a coordinate: |q|, or the largest parameter of its dimension in its rows; angle: at most 1 rad
+    rate   [1/s] of the motion: the largest sqrt(|vdot| / size), and |v| / size where a row tells the size
 
-A coordinate at 0 of whose dimension there is no parameter has no size: its 0 is a mark on a ruler.  There the
-motion itself tells what is large, V tau and A tau^2 with V and A the largest speed and acceleration of its
-dimension: tau is the shortest time in which anything changes, 1/rate of the coordinates that have a size, or
-V/A.  Parameters and angles alone give that rate (a place may be far away, and says nothing), and V/A the
-forces before they cancel.
+The rows of a coordinate are those of the constraints and of M in which it stands.  No parameter counts that
+stands in none of them, as in a force alone: it says nothing of where the motion goes.  A coordinate without
+any takes the largest of the others of its dimension; if there is none either and it is at 0, it has no
+size: its 0 is a mark on a ruler.  There the motion itself tells what is large, V tau and A tau^2 with V and A the
+largest speed and acceleration of its dimension: tau is the shortest time in which anything changes, 1/rate of the
+coordinates that have a size, or V/A.  Rows and angles alone give that rate (a place may be far away, and says
+nothing), and V/A the forces before they cancel.
 
 A displacement of each coordinate tells what holds it: dvdot, were it displaced by its size.  At rest on
 springs that balance, what is left of the acceleration is rounding, and sqrt(|dvdot| / size) is the rate.
@@ -32,34 +34,34 @@ Mask = NDArray[np.bool_]
 
 
 def extents(system: System, p: Sequence[float]) -> Vector:
-    """For each coordinate (nq) the largest magnitude among the parameters of its dimension, those that are
-    numbers in the code with them; angles: 0."""
-    return _largest(system, p, system.dimension, system.folded or (0.0,) * system.nq)
+    """For each coordinate (nq) the largest magnitude among the parameters of its dimension that stand in
+    its rows, those that are numbers in the code with them; angles: 0."""
+    own = [max((abs(p[i]) for i in indices), default=0.0) for indices in system.extents]
+    return np.array(own, dtype=float).clip(min=system.folded)
 
 
-def _largest(
-    system: System, p: Sequence[float], dimensions: Sequence[int], folded: Sequence[float]
-) -> Vector:
-    largest: dict[int, float] = {}
-    for value, of in zip(p, system.extent_dimension, strict=False):
-        largest[of] = max(largest.get(of, 0.0), abs(value))
-    return np.array([largest.get(of, 0.0) for of in dimensions]).clip(min=folded)
+def _shared(system: System, p: Sequence[float]) -> Vector:
+    """The same; where rows tell none, the largest that other coordinates of its dimension have."""
+    own = extents(system, p)
+    alike = np.array(system.dimension)
+    others = np.array([own[alike == of].max() for of in system.dimension])
+    return np.where(own > 0, own, others)
 
 
-def in_speeds(system: System, p: Sequence[float], size: Vector) -> Vector:
+def in_speeds(system: System, size: Vector) -> Vector:
     """Sizes (nq) of coordinates as those of displacements in speeds (nv): of the coordinates of the same
-    dimension that a speed moves, else of the parameters of that dimension; of an angle alone 1 rad."""
+    dimension that a speed moves; of an angle alone 1 rad."""
     if system.kinematics is None:
         return size
-    alone = _largest(system, p, system.speed_dimension, system.speed_folded or (0.0,) * system.nv)
     turns = np.array(system.speed_dimension) == system.angle_dimension
-    return system.across(size, np.where(turns, 1.0, alone))
+    return system.across(size, np.where(turns, 1.0, 0.0))
 
 
-def sizes(system: System, q: Vector, p: Sequence[float], before: Vector) -> Vector:
+def sizes(at: Instant, q: Vector, before: Vector) -> Vector:
     """The coordinates' sizes (n); 0 where there is none.  `before` (n): sizes before a projection."""
+    system = at.system
     place = np.where(np.abs(q) > LOST * before, np.abs(q), 0.0)
-    size = np.maximum(place, extents(system, p))
+    size = np.maximum(place, _shared(system, at.p))
     angles = list(system.angles)
     if angles:
         size[angles] = min(place[angles].max(), 1.0) or 1.0
@@ -91,8 +93,9 @@ def _largest_alike(system: System, x: Vector, dimensions: Sequence[int]) -> Vect
 
 def natural(
     at: Instant, q: Vector, v: Vector, size: Vector, now: Motion, rows: Sequence[int]
-) -> tuple[Vector, float]:
-    """Sizes (n) as far as they can be known, from those of places, and the natural rate [1/s]; 0: not known.
+) -> tuple[Vector, float, Vector]:
+    """Sizes (n) as far as they can be known, from those of places; the natural rate [1/s], 0: not known; what
+    speeds (nv) the forces give within what they move, or the natural rate if that is less or there are none.
 
     `now` is the motion, and `rows` those of the rows that act in it which do not depend on others.
     """
@@ -100,8 +103,8 @@ def natural(
     size = size.copy()
     measured = extents(system, at.p) > 0
     measured[list(system.angles)] = True
-    span = in_speeds(system, at.p, size)
-    sure = in_speeds(system, at.p, np.where(known & measured, size, 0.0)) > 0
+    span = in_speeds(system, size)
+    sure = in_speeds(system, np.where(known & measured, size, 0.0)) > 0
     steady = _rate(system, span, speed, felt, sure)
     slowest = min(_rates(system, span, speed, np.zeros(system.nv), span > 0), default=0.0)
     fastest = 0.0  # of the rates by which sizes are taken from the motion
@@ -122,8 +125,13 @@ def natural(
         back = _held(at, q, v, np.where(known, size, 0.0), now, rows)
         if (pull <= LOST * np.maximum(felt, back)).all():  # it rests
             pull = np.where(back > LOST / DISPLACED * felt, back, 0.0)
-    rate = max(_rate(system, span, speed, pull, span > 0), fastest)
-    return size, rate or _rate(system, span, speed, felt, span > 0)
+    told = np.where(sure, speed, 0.0)
+    rate = max(_rate(system, span, told, pull, span > 0), fastest)
+    rate = rate or _rate(system, span, speed, felt, span > 0)
+    span = in_speeds(system, size)
+    own = np.sqrt(span * felt)
+    natural = span * rate
+    return size, rate, np.where((own > 0) & ((own < natural) | (natural == 0)), own, natural)
 
 
 def _held(

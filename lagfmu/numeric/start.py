@@ -22,7 +22,7 @@ from .motion import NONE, motion, stick_slip
 from .nominals import in_speeds, motion_speeds, natural, sizes
 from .start_priority import GIVEN, Moved
 from .system import Sparse, System, Vector
-from .thresholds import LARGEST_ANGLE, TOUCH
+from .thresholds import LARGEST_ANGLE, ROUNDINGS, TOUCH
 
 SMALLEST_MASS = float(np.finfo(float).tiny)  # below it a double has fewer digits
 MOVED = 1e-12  # part of a value by which it has moved
@@ -31,8 +31,9 @@ MOVED = 1e-12  # part of a value by which it has moved
 @dataclass(frozen=True)
 class Start:
     """q (nq), v (nv) on the constraints; one entry a contact: is it closed; the switch states of forces
-    that jump; the sizes of coordinates (nq) and of displacements in speeds (nv), the natural rate [1/s];
-    each value that had to be moved."""
+    that jump; the sizes of coordinates (nq), of displacements in speeds (nv) and of speeds (nv), the
+    natural rate [1/s]; how far each contact is open, and the largest term of its f; each value that had
+    to be moved."""
 
     q: Vector
     v: Vector
@@ -40,7 +41,10 @@ class Start:
     switch_states: tuple[float, ...]
     size: Vector
     span: Vector
+    swift: Vector
     rate: float
+    heights: Vector
+    extents: Vector
     moved: tuple[Moved, ...]
 
 
@@ -79,14 +83,22 @@ def _start(at: Instant, q0: Vector, v0: Vector, priority: list[int]) -> Start:
     closed = closed_contacts(at, q, v, touching) if system.contacts else ()
     rows, slips = system.active(closed), NONE
     if system.frictions:
-        rows, slips = stick_slip(at, q, v, rows, in_speeds(system, at.p, size))
+        rows, slips = stick_slip(at, q, v, rows, in_speeds(system, size))
     now = motion(at, q, v, rows, slips)
     held = [rows[i] for i in independent(now.M, now.G[rows])]
-    size, rate = natural(at, q, v, size, now, held)
+    size, rate, swift = natural(at, q, v, size, now, held)
     states = tuple(at.u[len(at.u) - len(system.switches) :])
-    span = in_speeds(system, at.p, size)
-    moved = _moved(system, [*q0, *v0], [*q, *v], [*size, *(span * rate)], priority)
-    return Start(q, v, closed, states, size, span, rate, moved)
+    span = in_speeds(system, size)
+    moved = _moved(system, [*q0, *v0], [*q, *v], [*size, *swift], priority)
+    heights, extents = _opened(at, q, closed)
+    return Start(q, v, closed, states, size, span, swift, rate, heights, extents, moved)
+
+
+def _opened(at: Instant, q: Vector, closed: Sequence[bool]) -> tuple[Vector, Vector]:
+    """Of each contact how far it is open, and the largest term of its f; 0 where it is closed."""
+    contacts, is_open = list(at.system.contacts), ~np.array(closed, dtype=bool)
+    heights = np.where(is_open, np.maximum(at.residual(q)[contacts], 0.0), 0.0)
+    return heights, np.where(is_open, at.terms(q)[contacts], 0.0)
 
 
 def _positions(
@@ -96,12 +108,11 @@ def _positions(
     does."""
     system = at.system
     contacts = list(system.contacts)
-    size = sizes(system, q0, at.p, np.zeros(system.nq))
+    size = sizes(at, q0, np.zeros(system.nq))
     q = initial_positions(at, q0, v0, system.permanent, size, priority)
     gap, near = np.zeros(0), [False] * len(contacts)
     for _ in range(len(contacts) + 1):
-        G = at.equations(q, v0)[2]
-        gap = TOUCH * (np.abs(G) @ in_speeds(system, at.p, np.maximum(np.abs(q), size)))[contacts]
+        gap = ROUNDINGS * EPS * at.terms(q)[contacts]
         near = (at.residual(q)[contacts] <= gap).tolist()
         before, q = q, initial_positions(at, q, v0, system.active(near), size, priority)
         if (np.abs(q - before) <= 4 * EPS * size).all():
@@ -114,7 +125,7 @@ def _positions(
                 "way: take off whole turns"
             )
     _check_sides(at, q)
-    return q, sizes(system, q, at.p, size), gap, near
+    return q, sizes(at, q, size), gap, near
 
 
 def _check_sides(at: Instant, q: Vector) -> None:
@@ -147,7 +158,7 @@ def _velocities(
     M, F, G, nu, _ = at.equations(q, v0)
     _check_masses(at, q, v0, M)
     mass = np.where(M.diagonal() > 0, M.diagonal(), np.inf)
-    span = in_speeds(system, at.p, size)
+    span = in_speeds(system, size)
     free = np.sqrt(span * np.abs(F) / mass)  # speeds that the forces alone would give
     unit = np.abs(G) @ motion_speeds(system, M, np.maximum(np.abs(v0), free))
     rising = (G @ v0 - nu > TOUCH * unit)[list(system.contacts)]

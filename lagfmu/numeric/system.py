@@ -87,8 +87,9 @@ class System:
     are those of the lower triangle.  `prescribed` are the positions in u where a prescribed motion
     and its two derivatives begin.  `dimension` (nq), `speed_dimension` (nv) and `extent_dimension` (p) number
     the dimensions of coordinates, of speeds times a second and of parameters (-1: of none of these),
-    `angle_dimension` is that of angles (-1: there are none); `folded` (nq) and `speed_folded` (nv) are the
-    largest magnitudes of the dimension among the parameters that are numbers in the code.
+    `angle_dimension` is that of angles (-1: there are none); `extents` (nq): the parameters of a coordinate's
+    dimension in its rows; `folded` (nq) and `speed_folded` (nv) are the largest magnitudes among those, and
+    among all of the dimension, that are numbers in the code.
 
     kinematics(t, q, u, p) -> (B values, b) of q' = B v + b, None where q' = v; `rates` are the (row,
     column) indices of B.  `quaternions`: the places in q of e0, e1, e2, e3, whose norm is 1;
@@ -101,6 +102,8 @@ class System:
     jump wherever h is a whole number; `driven`: length of u, the inputs and the switch states behind them.
 
     sides(t, q, u, p) -> what is positive where the joint of each row of `sided` is not turned over.
+
+    terms(t, q, u, p) -> the largest magnitude among the terms of each f (m); None where there is no f.
 
     starts(p) -> the start values that are expressions of parameters, at the positions `started` of (q, v).
 
@@ -125,6 +128,7 @@ class System:
     extent_dimension: tuple[int, ...] = ()
     angle_dimension: int = -1
     folded: tuple[float, ...] = ()
+    extents: tuple[tuple[int, ...], ...] = ()
     speed_folded: tuple[float, ...] = ()
     kinematics: Callable[..., Any] | None = None
     rates: tuple[Sequence[int], Sequence[int]] = ((), ())
@@ -146,6 +150,7 @@ class System:
     starts: Callable[..., Any] | None = None
     sided: tuple[int, ...] = ()
     sides: Callable[..., Any] | None = None
+    terms: Callable[..., Any] | None = None
 
     @cached_property
     def nq(self) -> int:

@@ -206,7 +206,7 @@ def _missed(posed: Posed, begun: Start) -> tuple[str, ...]:
     at = at_start(system, q, u, p)
     _, _, G, nu, _ = at.equations(q, v)
     moves = np.array([all(free[j] for j in places) for places in system.moved_by], dtype=bool)
-    places = _uncured(at.residual(q)[rows], G[rows], in_speeds(system, p, np.abs(q)), moves)
+    places = _uncured(at.residual(q)[rows], G[rows], in_speeds(system, np.abs(q)), moves)
     rates = _uncured((G @ v - nu)[rows], G[rows], np.abs(v), free[n:])
     units = {r.name: r.unit or ONE for r in table.those(RESIDUAL)}
     found = []

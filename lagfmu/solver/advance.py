@@ -6,7 +6,7 @@
 The integrators are scipy.integrate's DOP853 (Hairer, Norsett & Wanner, Solving Ordinary Differential
 Equations I, sect. II.5 and II.6) and Radau (Hairer & Wanner II, sect. IV.8).  After each accepted step y
 is projected, and the next step begins there.  The error of a step is weighed by tolerance * max(|y_i|,
-s_i), s_i being the size of the coordinate, and that size times the natural rate for its velocity.  The
+s_i), s_i being the size of the coordinate or, for a speed, what forces give it within that size.  The
 integrator begins anew at each communication point and after each event.
 """
 
@@ -99,7 +99,14 @@ def _scaled(motion: Motion, settings: Settings, state: State, h: float) -> Setti
         way = np.abs(motion.system.shift(state.t, q, span, motion.inputs(state.t), motion.p))
         way = np.maximum(way, np.abs(motion.rate(state.t, q, v)) * h)  # of what no speed moves
         size = np.where(size > 0, size, np.where(way > 0, way, 1.0))
-    return replace(settings, size=tuple(size.tolist()), span=tuple(span.tolist()), rate=rate)
+    swift = np.where(np.array(settings.swift) > 0, settings.swift, rate * span)
+    return replace(
+        settings,
+        size=tuple(size.tolist()),
+        span=tuple(span.tolist()),
+        swift=tuple(swift.tolist()),
+        rate=rate,
+    )
 
 
 class _Headway:
@@ -136,7 +143,7 @@ def _segment(
     t, y = state.t, np.array([*state.q, *state.v])
     ranks = motion.ranks(motion.terms(t, y[:n], y[n:]), rows)
     stepper = _Stepper(motion, settings, (rows, ranks.all), t, y, end, state.step)
-    search = Search(motion, settings, state, rows, ranks.all) if system.contacts else None
+    search = Search(motion, state, rows, ranks.all) if system.contacts else None
     steps, proposed = state.steps, state.step
     while True:
         before, y = stepper.step(t, y)
@@ -149,6 +156,7 @@ def _segment(
             found = search.first(t, now, dense)
             if found is not None:
                 now, y = found.t, dense(found.t)
+            state = search.opened(state, now, dense)
         q, v, ranks = _projected(motion, now, y, rows, span, ranks)
         t, y, stepper.rank = now, np.concatenate([q, v]), ranks.all
         if found is not None or now >= end:
@@ -190,7 +198,7 @@ class _Stepper:
     ) -> None:
         self.motion, self.settings, self.end = motion, settings, end
         self.rows, self.rank = rows
-        scale = [*settings.size, *(settings.rate * s for s in settings.span)]
+        scale = [*settings.size, *settings.swift]
         self.weights = settings.tolerance * np.array(scale)
         self.method: Any = self._begin(t, y, first)
 

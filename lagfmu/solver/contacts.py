@@ -7,6 +7,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,9 +15,12 @@ from ..numeric.system import System, Vector
 from .complementarity import acting_together
 from .equations import Motion, Terms
 from .linear import rows_of
-from .state import Settings
+from .state import Settings, State
 
-TOUCHING = 1e-9  # part of the terms of a contact's f, and of its rate, up to which they count as 0
+ROUNDINGS = 64 * float(np.finfo(float).eps)  # part of the largest term of f that is rounding
+TOUCHING = (
+    1e-9  # part of the way that a contact has been open, and of the terms of its rate, that is none
+)
 
 
 def as_flags(system: System, rows: Collection[int]) -> tuple[bool, ...]:
@@ -29,16 +33,37 @@ def closed_rows(system: System, closed: Iterable[bool]) -> frozenset[int]:
     return frozenset(k for k, shut in zip(system.contacts, closed, strict=True) if shut)
 
 
-def gap_of_rounding(system: System, terms: Terms, q: Vector, settings: Settings) -> Vector:
-    """(m) what f may be of a contact that touches."""
-    span = np.array(settings.span)
-    reach: Vector = TOUCHING * (np.abs(terms.G) @ np.maximum(system.across(np.abs(q), span), span))
-    return reach
+def opened(motion: Motion, t: float, q: Vector, state: State) -> State:
+    """The state with how far its open contacts have been, q having been passed at t."""
+    f, terms, heights, extents = (
+        motion.residual(t, q),
+        None,
+        list(state.heights),
+        list(state.extents),
+    )
+    for c, k in enumerate(motion.system.contacts):
+        if state.closed[c] or not f[k] > heights[c]:
+            continue
+        terms = motion.magnitudes(t, q) if terms is None else terms
+        heights[c], extents[c] = float(f[k]), max(extents[c], float(terms[k]))
+    return (
+        state if terms is None else replace(state, heights=tuple(heights), extents=tuple(extents))
+    )
+
+
+def gap_of_rounding(motion: Motion, t: float, q: Vector, state: State) -> Vector:
+    """(m) what f may be of a contact that touches: rounding of its terms, or next to nothing of the way that
+    it has been open, or of its terms there where these are smaller, so that bounces end."""
+    gap: Vector = ROUNDINGS * motion.magnitudes(t, q)
+    for c, k in enumerate(motion.system.contacts):
+        own = max(gap[k], ROUNDINGS * state.extents[c])
+        gap[k] = max(own, TOUCHING * min(state.heights[c], state.extents[c]))
+    return gap
 
 
 def speed_of_rounding(terms: Terms, v: Vector, settings: Settings) -> Vector:
     """(m) what |G v - nu| may be of a contact at rest."""
-    speed = np.maximum(np.abs(v), settings.rate * np.array(settings.span))
+    speed = np.maximum(np.abs(v), np.array(settings.swift))
     reach: Vector = TOUCHING * (np.abs(terms.G) @ speed + np.abs(terms.nu))
     return reach
 

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..numeric.failure import MasslessError, StepFailureError, evaluated
+from ..numeric.instant import Instant
 from ..numeric.system import NONHOLONOMIC, Matrix, System, Vector
 from .linear import Rows, rows_of, solve
 
@@ -72,6 +73,11 @@ class Motion:
         if not np.isfinite(f).all():
             raise StepFailureError(f"a constraint is not finite at t = {t!r} s")
         return f
+
+    def magnitudes(self, t: float, q: Vector) -> Vector:
+        """(m): the largest magnitude among the terms of each f, of which f is rounding."""
+        found: Vector = Instant(self.system, t, self.inputs(t), self.p).terms(q)
+        return found
 
     def accelerations(self, terms: Terms, rank: int | None = None) -> tuple[Vector, Vector, Rows]:
         """vdot (nv), lambda (m) of the rows in `terms`, and these rows decomposed."""

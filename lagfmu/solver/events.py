@@ -20,9 +20,9 @@ import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
 from ..numeric.system import Vector
-from .contacts import closed_rows, gap_of_rounding
+from .contacts import closed_rows, gap_of_rounding, opened
 from .equations import Motion
-from .state import Settings, State
+from .state import State
 
 LOOKS = 6
 TOGETHER = 1e-12  # of the time: roots no farther apart are one instant
@@ -41,10 +41,8 @@ class Found(NamedTuple):
 class Search:
     """The root functions of one mode."""
 
-    def __init__(
-        self, motion: Motion, settings: Settings, state: State, rows: Sequence[int], rank: int
-    ) -> None:
-        self.motion, self.settings, self.rows, self.rank = motion, settings, list(rows), rank
+    def __init__(self, motion: Motion, state: State, rows: Sequence[int], rank: int) -> None:
+        self.motion, self.state, self.rows, self.rank = motion, state, list(rows), rank
         self.closed = sorted(closed_rows(motion.system, state.closed))
         self.open = [k for k in motion.system.contacts if k not in self.closed]
 
@@ -52,11 +50,10 @@ class Search:
         """The first event in t0 < t <= t1 of the motion y(t) = dense(t) = (q, v); None if there is
         none.
         """
-        times = np.linspace(t0, t1, LOOKS + 1).tolist()
+        times = self.times = np.linspace(t0, t1, LOOKS + 1).tolist()
         looks = [self._look(t, dense) for t in times]
         n = self.motion.system.nq
-        terms = self.motion.terms(t1, dense(t1)[:n], dense(t1)[n:])
-        small = gap_of_rounding(self.motion.system, terms, dense(t1)[:n], self.settings)
+        small = gap_of_rounding(self.motion, t1, dense(t1)[:n], self.state)
         roots: dict[int, float] = {}
         for k in self.closed:
 
@@ -84,6 +81,15 @@ class Search:
         t = min(roots.values())
         now = {k for k, root in roots.items() if root - t <= TOGETHER * max(abs(t), t1 - t0)}
         return Found(t, frozenset(now & {*self.closed}), frozenset(now & {*self.open}))
+
+    def opened(self, state: State, until: float, dense: Callable[[float], Vector]) -> State:
+        """The state with how far its open contacts have been in the step just searched, until then."""
+        n = self.motion.system.nq
+        for t in self.times if self.open else ():
+            if t <= until:
+                state = opened(self.motion, t, dense(t)[:n], state)
+        self.state = state
+        return state
 
     def _look(
         self, t: float, dense: Callable[[float], Vector]

@@ -18,7 +18,7 @@ from ..numeric.system import System
 class Settings:
     """Method, relative tolerance, longest step [s] (0: any), how many tiny steps a communication step may
     take (0: any), and the scale of the motion at the start: the size of each coordinate (nq), that of a
-    displacement in each speed (nv), and the rate [1/s].
+    displacement in each speed (nv), that of each speed (nv), and the rate [1/s].
     """
 
     method: str
@@ -27,6 +27,7 @@ class Settings:
     maximum_steps: float
     size: tuple[float, ...]
     span: tuple[float, ...]
+    swift: tuple[float, ...]
     rate: float
 
 
@@ -46,7 +47,7 @@ class Event:
 class State:
     """Time [s], coordinates (nq), speeds (nv); of each contact: is it closed, latest departure and closing;
     the next step [s] (0: to be found), the latest communication step [s], steps so far, energy lost in
-    impacts [J]."""
+    impacts [J]; of each contact: the farthest that it has been open, and the largest term of its f there."""
 
     t: float
     q: tuple[float, ...]
@@ -58,12 +59,15 @@ class State:
     span: float = 0.0
     steps: int = 0
     dissipated: float = 0.0
+    heights: tuple[float, ...] = ()
+    extents: tuple[float, ...] = ()
 
 
 def restored_settings(kept: dict[str, Any], methods: Sequence[str], system: System) -> Settings:
     """From what asdict made of them.  Raises ValueError, TypeError or KeyError if that is none."""
     size, span = _numbers(kept.pop("size"), system.nq), _numbers(kept.pop("span"), system.nv)
-    settings = Settings(**kept, size=size, span=span)
+    swift = kept.pop("swift")
+    settings = Settings(**kept, size=size, span=span, swift=_numbers(swift, system.nv))
     if settings.method not in methods:
         raise ValueError(f"its method is {settings.method!r}")
     numbers = settings.tolerance, settings.maximum_step, settings.maximum_steps, settings.rate
@@ -88,7 +92,17 @@ def restored(system: System, kept: dict[str, Any]) -> State:
     )
     if not len(departures) == len(closings) == contacts:
         raise ValueError("it has other contacts")
-    state = State(q=q, v=v, closed=closed, departures=departures, closings=closings, **kept)
+    heights, extents = (_numbers(kept.pop(x), contacts) for x in ("heights", "extents"))
+    state = State(
+        q=q,
+        v=v,
+        closed=closed,
+        departures=departures,
+        closings=closings,
+        heights=heights,
+        extents=extents,
+        **kept,
+    )
     if not _is_count(state.steps) or not all(
         _is_number(x) for x in (state.t, state.step, state.span, state.dissipated)
     ):

@@ -49,7 +49,7 @@ def begun(motion: Motion, settings: Settings, state: State) -> State:
     if system.prescribed:
         left = _left_behind(motion, settings, state, terms)
         closed -= left
-        f, small = motion.residual(state.t, q), gap_of_rounding(motion.system, terms, q, settings)
+        f, small = motion.residual(state.t, q), gap_of_rounding(motion, state.t, q, state)
         met = frozenset(k for k in system.contacts if k not in closed and f[k] < -small[k])
         rows = system.active(as_flags(system, closed | met))
         q = project_positions(motion, state.t, q, v, rows, np.array(settings.span))
@@ -85,7 +85,7 @@ def _settled(
     system, t, was = motion.system, state.t, closed_rows(motion.system, state.closed)
     terms, f = motion.terms(t, q, v), motion.residual(t, q)
     small, slow = (
-        gap_of_rounding(motion.system, terms, q, settings),
+        gap_of_rounding(motion, t, q, state),
         speed_of_rounding(terms, v, settings),
     )
     touching = closed | {k for k in system.contacts if f[k] <= small[k]}
@@ -173,7 +173,7 @@ def _left_behind(motion: Motion, settings: Settings, state: State, terms: Terms)
     }  # the accelerations with which they would follow
     f, s, h = motion.residual(state.t, q), terms.G @ v - terms.nu, state.span
     small, slow = (
-        gap_of_rounding(motion.system, terms, q, settings),
+        gap_of_rounding(motion, state.t, q, state),
         speed_of_rounding(terms, v, settings),
     )
     return frozenset(

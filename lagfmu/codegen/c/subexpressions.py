@@ -40,7 +40,7 @@ class Names:
 
     def describe(self, symbol: Expr, e: Expr) -> None:
         """sin(theta) is called sin_theta."""
-        if len(e.args) == 1 and e.is_Function and e.args[0].is_Symbol:
+        if len(e.args) == 1 and e.is_Function and self.local.get(e.args[0], "").isidentifier():
             text = f"{e.func.__name__}_{self.local[e.args[0]]}"
             if text not in self.taken:
                 self.taken.add(text)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections.abc import Collection, Sequence
+from itertools import accumulate
 from textwrap import wrap
 from typing import Any
 
@@ -70,11 +71,14 @@ class Tables:
         )
 
     def _sizes(self) -> None:
-        """The dimensions of coordinates, speeds and parameters, and the largest of them that are numbers."""
-        of, (folded, _) = self.parts.dimensions, self.parts.folded
+        """The dimensions of coordinates and speeds, and what in its rows tells how large a coordinate is."""
+        of = self.parts.dimensions
         self.fields |= {"parameters": len(self.eom.p), "angles": of.angles}
         self._pair("const int", dimension=of.coordinates, speed_dimension=of.speeds)
-        self._hold("const int", extent_dimension=of.parameters)
+        extents, folded = self.parts.extents
+        self._hold("const int", extent=[i for own in extents for i in own])
+        starts = [0, *accumulate(map(len, extents))]
+        self._hold("const int", extent_start=starts)
         self._hold("const double", folded=folded if any(folded) else ())
 
     def _rows(self) -> None:

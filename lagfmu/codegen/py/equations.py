@@ -135,8 +135,9 @@ def _system(parts: Parts) -> list[str]:
             "speed_dimension": repr(dimensions.speeds),
             "extent_dimension": repr(dimensions.parameters),
             "angle_dimension": repr(dimensions.angles),
-            "folded": repr(parts.folded[0]),
-            "speed_folded": repr(parts.folded[1]),
+            "folded": repr(parts.extents[1]),
+            "extents": repr(parts.extents[0]),
+            "speed_folded": repr(parts.speed_folded),
             "embedding": embedding,
             "formulation": repr(parts.formulation),
         }
@@ -154,7 +155,15 @@ def _system(parts: Parts) -> list[str]:
         fields["unwrapped"] = repr(tuple(eom.unwrapped))
     if "sides" in texts:
         fields["sided"] = repr(tuple(eom.sides))
-    for name in ("surfaces", "starts", "coulomb", "kinematics", "unwrapped_angles", "sides"):
+    for name in (
+        "surfaces",
+        "starts",
+        "coulomb",
+        "kinematics",
+        "unwrapped_angles",
+        "sides",
+        "terms",
+    ):
         if name in texts:
             fields[name] = f"{p}{name}"
     if "lookups" in texts:

@@ -232,11 +232,24 @@ class Instance:
             value[names.MAXIMUM_STEPS],
             tuple(float(x) for x in found.size),
             tuple(float(x) for x in found.span),
+            tuple(float(x) for x in found.swift),
             float(found.rate),
         )
         never = (Event(),) * len(found.closed)
         q, v = (tuple(float(x) for x in part) for part in (found.q, found.v))
-        self.state = State(self.start_time, q, v, tuple(found.closed), never, never)
+        heights, extents = (
+            tuple(float(x) for x in part) for part in (found.heights, found.extents)
+        )
+        self.state = State(
+            self.start_time,
+            q,
+            v,
+            tuple(found.closed),
+            never,
+            never,
+            heights=heights,
+            extents=extents,
+        )
         self.foreseen, self.seen = u, None
         return self.state
 

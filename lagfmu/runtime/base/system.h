@@ -79,10 +79,10 @@ struct System {
     int estimated_count;
     const int *estimated;     /* positions of those that der(u,3) follows: their rates are estimated */
     const int *dimension;        /* (nq) coordinates of one physical dimension have one number */
-    const double *folded;        /* (nq) the largest magnitude of the dimension among parameters that are
-                                  * numbers in the code; NULL: there are none */
+    const double *folded;        /* (nq) the largest magnitude of the dimension among parameters in the coordinate's
+                                  * rows that are numbers in the code; NULL: there are none */
+    const int *extent_start, *extent; /* (nq + 1), and from there on the parameters of its dimension in its rows */
     const int *speed_dimension;  /* (nv) the number of the dimension of each speed times a second */
-    const int *extent_dimension; /* (parameters) the number of those that it compares to; -1: none */
     int angles;                  /* the number of those without dimension; -1: none */
     Formulation formulation;
     int separable;            /* constant mass, forces without velocities, position constraints only */
@@ -113,6 +113,8 @@ struct System {
                               const double *du, const double *dp, double *dangle);
     /* f (m), 0 for a nonholonomic row */
     void (*residual)(double t, const double *q, const double *u, const double *p, double *f);
+    /* (m) the largest magnitude among the terms of each f, of which f is rounding; NULL where there is no f */
+    void (*terms)(double t, const double *q, const double *u, const double *p, double *term);
     /* h (switches): the surfaces at which forces jump; NULL where there are none */
     void (*surfaces)(double t, const double *q, const double *u, const double *p, double *h);
     /* bounds on the rates of f of the contacts, then of h of the switches, in boxes of t, q, v and u (with

@@ -28,7 +28,8 @@ static const double SMALLEST_TOLERANCE = 1e-14; /* of a step, relative: less is 
 static const double LARGEST_TOLERANCE = 0.1; /* ... and from 0.7 on steps go through contacts unseen */
 
 /* ---- the motion's own sizes and times ---- */
-static const double TOUCH = 1e-9; /* |f| below this, in the constraint's own size, counts as touching */
+static const double ROUNDINGS = 64; /* of its terms: |f| of a contact that touches, ... */
+static const double TOUCH = 1e-9; /* ... or, of the farthest that it has been, what ends its bounces; of speeds: none */
 static const double LOST = 1e3 * DBL_EPSILON; /* what projections leave of a place, or cancelling forces */
 static const double DISPLACED = 0x1p-20; /* of a coordinate's size, to see what holds it, ... */
 enum { LOTS = 64 }; /* ... in so many lots at most: every 64th is displaced at once */

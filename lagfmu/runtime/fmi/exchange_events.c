@@ -14,6 +14,7 @@
 #include "feature.h"
 #include "indicators.h"
 #include "losses.h"
+#include "nominals.h"
 #include "optional.h"
 #include "schur.h"
 #include "segment.h"
@@ -67,6 +68,7 @@ static Status find_happened(Instance *x, int *any) {
     if (exchange_multipliers(x) != OK) return FAILED;
     if (mechanism_residual(b, segment_instant(s, s->state.now.t), s->state.q, b->f) != OK)
         return FAILED;
+    nominals_watch(s, segment_instant(s, s->state.now.t), s->state.q);
     for (int c = 0; c < s->system->contacts; c++) {
         const int k = s->system->contact[c];
         x->pull[c] = b->gamma[k] - mechanism_row(b, k, b->vdot);

@@ -72,7 +72,7 @@ static double own_rate(const Tried *x) {
     return exp(logarithm / (ROUNDS - GAIN_SETTLED));
 }
 
-/* The largest rate that an acceleration gives to what has a size that a parameter tells; an angle's is 1 rad. */
+/* The largest rate that an acceleration gives to what has a size that a row tells; an angle's is 1 rad. */
 static double sized_rate(Solver *s, const double *vdot) {
     const System *system = s->system;
     double *least = s->work_initial, rate = 0;

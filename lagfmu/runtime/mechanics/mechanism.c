@@ -25,6 +25,7 @@ void mechanism_layout(Mechanism *b, Arena *arena, const System *s, Why *why,
     b->vdot = arena_doubles(arena, s->nv);
     b->lambda = arena_doubles(arena, s->m);
     b->f = arena_doubles(arena, s->m);
+    b->terms = arena_doubles(arena, s->m);
     b->dq = arena_doubles(arena, s->nv);
     b->reach = arena_doubles(arena, s->nv);
     b->place = arena_doubles(arena, s->nv);
@@ -150,6 +151,15 @@ void mechanism_at_work(const Mechanism *b, double *forces, double *reach) {
         const int j = s->mass_row[e];
         if (s->mass_column[e] == j && b->M[e] > 0) reach[j] = fmax(reach[j], forces[j] / b->M[e]);
     }
+}
+
+void mechanism_terms(Mechanism *b, Instant at, const double *q) {
+    const System *s = b->system;
+    for (int k = 0; k < s->m; k++) b->terms[k] = 0;
+    if (s->terms == NULL) return;
+    s->terms(at.t, q, at.u, at.p, b->terms);
+    for (int k = 0; k < s->m; k++)
+        if (!(b->terms[k] <= DBL_MAX)) b->terms[k] = 0;
 }
 
 double mechanism_square(const Mechanism *b, const double *x) {

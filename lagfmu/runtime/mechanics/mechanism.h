@@ -52,6 +52,7 @@ struct Mechanism {
     double *vdot, *lambda;          /* of the latest motion(): (nv), (m) */
     unsigned long evaluations;      /* how many there have been: whether a motion is still the latest */
     double *f;                      /* (m) scratch for residuals */
+    double *terms;                  /* (m) of mechanism_terms() */
     double *dq, *trial, *nearer;    /* (nv), (nq), (nq) scratch of project(): what moves, q where it is tried, q before */
     double *reach, *place;          /* (nv) scratch: mechanism_reach() and mechanism_place() of all, or at_work() */
     int *fixed;                     /* (m) scratch of project(): position constraints that act, with */
@@ -148,6 +149,9 @@ SHARED double mechanism_square(const Mechanism *b, const double *x);
 
 /* f (m).  FAILED if one is not finite. */
 SHARED Status mechanism_residual(Mechanism *b, Instant at, const double *q, double *f);
+
+/* b->terms (m): the largest magnitude among the terms of each f, of which f is rounding; 0 where there is none. */
+SHARED void mechanism_terms(Mechanism *b, Instant at, const double *q);
 
 /* evaluate, factor, solve: b->vdot (nv) and b->lambda (m), 0 where a row does not act.  Where multipliers are given
  * M vdot = F + G^T lambda alone, whatever rows act. */

@@ -12,6 +12,7 @@
 
 #include "event_search.h"
 #include "indicators.h"
+#include "nominals.h"
 #include "root.h"
 #include "segment.h"
 
@@ -183,6 +184,22 @@ static void arm(Solver *s, const Samples *samples) {
     }
 }
 
+/* How far open contacts have been in the step, up to time t. */
+static Status watch(Solver *s, const Samples *samples, double t, double *y) {
+    const int width = indicators_count(s->system);
+    for (int k = 0; k < samples->count && samples->t[k] <= t; k++) {
+        int higher = 0;
+        for (int c = 0; c < s->system->contacts; c++)
+            higher |= !s->state.closed[c] && samples->values[k * width + c] > s->state.height[c];
+        if (!higher) continue;
+        s->integrator.method->dense(&s->integrator, samples->t[k], y);
+        const Instant at = segment_instant(s, samples->t[k]);
+        if (mechanism_residual(&s->stepped, at, y, s->stepped.f) != OK) return FAILED;
+        nominals_watch(s, at, y);
+    }
+    return OK;
+}
+
 Status events_find(Solver *s, const double *y1) {
     const Integrator *i = &s->integrator;
     const int width = indicators_count(s->system);
@@ -197,6 +214,7 @@ Status events_find(Solver *s, const double *y1) {
         if (first_of(s, &x, &samples, k, &time, &found, &way) != OK) return FAILED;
         if (found) note_crossing(&s->state, width, k, time, way);
     }
+    if (watch(s, &samples, s->state.now.event_count > 0 ? s->state.now.event_time : i->t, y) != OK) return FAILED;
     if (s->state.now.event_count > 0) return OK;
     arm(s, &samples);
     memcpy(s->state.indicator, samples.values + (samples.count - 1) * width,

@@ -65,7 +65,7 @@ static Status find_positions(const Start *x) {
     const System *s = x->s->system;
     State *state = &x->s->state;
     Mechanism *b = &x->s->stepped;
-    double *moved = x->s->work_initial + 3 * s->nq + 3 * s->m, *unit = moved + s->nq;
+    double *moved = x->s->work_initial + 3 * s->nq + 3 * s->m;
     int *rows = x->s->iwork_initial;
     memcpy(state->q, x->q0, (size_t)s->nq * sizeof *state->q);
     if (mechanism_settle(b, x->at, state->q) == FAILED) return initial_refused(x->s);
@@ -75,12 +75,8 @@ static Status find_positions(const Start *x) {
     for (int count = 0; count <= s->contacts; count++) {
         if (mechanism_evaluate(b, x->at, state->q, x->v0) == FAILED) return initial_refused(x->s);
         if (mechanism_residual(b, x->at, state->q, b->f) == FAILED) return initial_refused(x->s);
-        for (int i = 0; i < s->nv; i++) unit[i] = fmax(mechanism_reach(b, state->q, i), state->span[i]);
-        for (int c = 0; c < s->contacts; c++) {
-            int k = s->contact[c];
-            state->gap[c] = TOUCH * mechanism_row_size(b, k, unit);
-            state->closed[c] = b->f[k] <= state->gap[c];
-        }
+        nominals_gaps(x->s, x->at, state->q);
+        for (int c = 0; c < s->contacts; c++) state->closed[c] = b->f[s->contact[c]] <= state->gap[c];
         system_active(s, state->closed, rows);
         memcpy(moved, state->q, (size_t)s->nq * sizeof *moved);
         if (initial_positions(x, moved, rows) == FAILED) return FAILED;
@@ -275,6 +271,9 @@ Status solver_start(Solver *s, double t, const double *q0, const double *v0, con
     if (find_velocities(&x) == FAILED) return FAILED;
     if (find_modes(&x) == FAILED) return FAILED;
     for (int c = 0; c < s->system->contacts; c++) s->state.armed[c] = !s->state.closed[c];
+    if (mechanism_residual(&s->stepped, x.at, s->state.q, s->stepped.f) == FAILED) return initial_refused(s);
+    nominals_watch(s, x.at, s->state.q);
+    nominals_gaps(s, x.at, s->state.q);
     if (find_nominals(&x) == FAILED) return FAILED;
     if (moved != NULL) initial_moved(&x, moved, context);
     return OK;

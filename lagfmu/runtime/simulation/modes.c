@@ -10,6 +10,7 @@
 #include "impact.h"
 #include "indicators.h"
 #include "losses.h"
+#include "nominals.h"
 #include "optional.h"
 #include "segment.h"
 #include "thresholds.h"
@@ -28,25 +29,21 @@ typedef struct {
     int *dead;     /* it takes its impulse without a rebound, which would be too low */
 } Flags;
 
-/* Speeds (m) of the rows that count as none, of the G that was evaluated last. */
+/* Speeds (m) of the contacts that count as none, of the G that was evaluated last. */
 static void find_slow(const Solver *s, double *slow) {
     const System *system = s->system;
-    for (int k = 0; k < system->m; k++)
-        slow[k] = SLOW * fmax(s->state.now.rate * mechanism_row_size(&s->stepped, k, s->state.span),
-                              mechanism_row_size(&s->stepped, k, s->state.scale + system->nq));
+    for (int c = 0; c < system->contacts; c++) {
+        const int k = system->contact[c];
+        slow[k] = SLOW * fmax(nominals_fall(s, c), mechanism_row_size(&s->stepped, k, s->state.scale + system->nq));
+    }
 }
 
 static Status find_near(Solver *s, Instant at, const int *happened, Flags *x) {
     const System *system = s->system;
     const double *f = s->stepped.f;
-    double *place = s->work_contacts;
     if (mechanism_residual(&s->stepped, at, s->state.q, s->stepped.f) != OK) return FAILED;
     if (mechanism_evaluate(&s->stepped, at, s->state.q, s->state.v) != OK) return FAILED;
-    for (int i = 0; i < system->nv; i++) place[i] = mechanism_reach(&s->stepped, s->state.q, i);
-    for (int c = 0; c < system->contacts; c++) { /* f of a motion that has gone far has more rounding */
-        const double rounding = LOST * mechanism_row_size(&s->stepped, system->contact[c], place);
-        s->state.gap[c] = fmax(s->state.gap[c], rounding);
-    }
+    nominals_gaps(s, at, s->state.q);
     for (int c = 0; c < system->contacts; c++) {
         const int shut = s->state.closed[c];
         x->departing[c] = happened[c] && shut;
@@ -223,8 +220,7 @@ static Status has_departed(Solver *s, Instant at, int c, double span, double dri
     if (mechanism_residual(b, at, s->state.q, b->f) != OK) return FAILED;
     if (mechanism_evaluate(b, at, s->state.q, s->state.v) != OK) return FAILED;
     const double gap = b->f[k], speed = mechanism_slip(b, k, s->state.v);
-    const double natural = mechanism_row_size(b, k, s->state.span) * s->state.now.rate;
-    const double moves = fmax(natural, mechanism_row_size(b, k, s->state.v) + fabs(b->nu[k]));
+    const double moves = fmax(nominals_fall(s, c), mechanism_row_size(b, k, s->state.v) + fabs(b->nu[k]));
     const double slow = fmax(SLOW, drift) * moves;
     const double close = fmax(s->state.gap[c], drift * mechanism_row_size(b, k, s->state.span));
     if (!(gap > close || speed > slow)) return OK;

@@ -1,15 +1,16 @@
 /* nominals.c -- what is large and what is small in a motion.  No unit counts.
  *
- *   size   of a coordinate: |q|, or the largest parameter of its dimension; of angles at most 1 rad
- *   rate   [1/s] of the motion: the largest |v| / size and sqrt(|vdot| / size)
+ *   size   of a coordinate: |q|, or the largest parameter of its dimension in its rows; of angles at most 1 rad
+ *   rate   [1/s] of the motion: the largest sqrt(|vdot| / size), and |v| / size where a row tells the size
  *   scale  below which an error is absolute: |q| and |v| of the start, or what rounding leaves of
  *          size, and of v what forces make of the rounding of q
  *
- * A coordinate at 0 of whose dimension there is no parameter has no size: its 0 is a mark on a
- * ruler.  There the motion itself tells what is large, V tau and A tau^2 with V and A the largest
- * speed and acceleration of its dimension: tau is the shortest time in which anything changes,
+ * Its rows are those of the constraints and of M in which it stands.  No parameter counts that stands in none of
+ * them, as in a force alone: it says nothing of where the motion goes.  A coordinate without any takes the largest of
+ * the others of its dimension; if there are none either and it is at 0, it has no size: its 0 is a mark on a ruler.
+ * There the motion itself tells what is large, V tau and A tau^2 with V and A the largest speed and acceleration of its dimension: tau is the shortest time in which anything changes,
  * 1/rate of the coordinates that have a size, or V/A.  Too small a size is safe, an error is then
- * measured by the motion reached so far; too large a one hides errors.  Hence parameters and angles
+ * measured by the motion reached so far; too large a one hides errors.  Hence rows and angles
  * alone give that rate (a place may be far away, and says nothing), and V/A the forces before they
  * cancel.
  *
@@ -43,18 +44,35 @@ static const double FASTEST = 1e150; /* [1/s] of a motion */
 static const double SIDES = 0.61803398874989485; /* golden ratio: its multiples fall on both sides in no period */
 static const double UNTOLD = -1; /* what no size and no rate is: those of one dimension are found together */
 
+/* A rate, or a size, whose square is a double too. */
+static double bounded(double rate) { return rate < FASTEST ? rate : FASTEST; }
+
 static double positive(double x) { return x > 0 ? x : STILL; }
 
+/* Of what speed i moves the coordinates that share with others: all of its dimension, but angles of a model with
+ * kinematics: there they are parts of quaternions, or count turns. */
+static int shares(const System *system, int i, int j) {
+    if (system->kinematics == NULL) return i == j;
+    return system->dimension[j] == system->speed_dimension[i] && system->dimension[j] != system->angles;
+}
+
 void nominals_extents(const System *s, const double *p, double *least) {
-    for (int j = 0; j < s->nq; j++) least[j] = UNTOLD;
     for (int j = 0; j < s->nq; j++) {
-        double largest = 0;
-        if (least[j] >= 0) continue;
-        for (int i = 0; i < s->parameters; i++)
-            if (s->extent_dimension[i] == s->dimension[j]) largest = larger(largest, fabs(p[i]));
-        for (int i = j; i < s->nq; i++)
-            if (s->dimension[i] == s->dimension[j])
-                least[i] = larger(s->folded != NULL ? s->folded[i] : 0, largest);
+        least[j] = s->folded != NULL ? s->folded[j] : 0;
+        for (int e = s->extent_start[j]; e < s->extent_start[j + 1]; e++)
+            least[j] = larger(least[j], fabs(p[s->extent[e]]));
+    }
+}
+
+/* Those that rows of a coordinate tell; where these tell none, the largest that other coordinates of its dimension
+ * have from theirs. */
+static void share_extents(const System *s, const double *p, double *least) {
+    double *own = least + s->nq;
+    nominals_extents(s, p, own);
+    for (int j = 0; j < s->nq; j++) {
+        least[j] = own[j];
+        for (int i = 0; i < s->nq && !(own[j] > 0); i++)
+            if (s->dimension[i] == s->dimension[j]) least[j] = larger(least[j], own[i]);
     }
 }
 
@@ -68,7 +86,7 @@ void nominals_sizes(Solver *s, Instant at, const double *q) {
     const System *system = s->system;
     double *size = s->state.size, *least = s->work_initial;
     double turn = 0;
-    nominals_extents(system, s->p, least);
+    share_extents(system, s->p, least);
     for (int j = 0; j < system->nq; j++) {
         const double place = fabs(q[j]) > LOST * size[j] ? fabs(q[j]) : 0;
         size[j] = larger(place, least[j]);
@@ -88,14 +106,6 @@ static double own_nominal(const Solver *s, const double *y, int i) {
     return larger(s->state.scale[i], fabs(y[i]));
 }
 
-/* Of what speed i moves the coordinates that share with others: all of its dimension, but angles of a model with
- * kinematics: there they are parts of quaternions, or count turns. */
-static int shares(const Solver *s, int i, int j) {
-    const System *system = s->system;
-    if (system->kinematics == NULL) return i == j;
-    return system->dimension[j] == system->speed_dimension[i] && system->dimension[j] != system->angles;
-}
-
 /* What the coordinates that speed i moves have, for others. */
 static double moved_nominal(const Solver *s, const double *y, int i) {
     const Mechanism *b = &s->stepped;
@@ -103,7 +113,7 @@ static double moved_nominal(const Solver *s, const double *y, int i) {
     if (s->system->kinematics == NULL) return own_nominal(s, y, i);
     for (int c = b->column_start[i]; c < b->column_start[i + 1]; c++) {
         const int j = s->system->rate_row[b->column_rate[c]];
-        if (shares(s, i, j)) most = larger(most, own_nominal(s, y, j));
+        if (shares(s->system, i, j)) most = larger(most, own_nominal(s, y, j));
     }
     return most;
 }
@@ -116,7 +126,7 @@ static void share_moved(const Solver *s, int i, double value, double *shared) {
     }
     for (int c = b->column_start[i]; c < b->column_start[i + 1]; c++) {
         const int j = s->system->rate_row[b->column_rate[c]];
-        if (shares(s, i, j)) share_largest(shared, j, value);
+        if (shares(s->system, i, j)) share_largest(shared, j, value);
     }
 }
 
@@ -167,9 +177,43 @@ void nominals_shared(const Solver *s, const double *y, double *shared) {
     for (int k = 0; k < system->quaternions; k++) share_quaternion(s, y, system->quaternion + 4 * k, shared);
 }
 
+void nominals_watch(Solver *s, Instant at, const double *q) {
+    const System *system = s->system;
+    State *x = &s->state;
+    mechanism_terms(&s->stepped, at, q);
+    for (int c = 0; c < system->contacts; c++) {
+        const int k = system->contact[c];
+        if (x->closed[c] || !(s->stepped.f[k] > x->height[c])) continue;
+        x->height[c] = s->stepped.f[k];
+        x->extent[c] = larger(x->extent[c], s->stepped.terms[k]);
+    }
+}
+
+void nominals_gaps(Solver *s, Instant at, const double *q) {
+    const System *system = s->system;
+    State *x = &s->state;
+    mechanism_terms(&s->stepped, at, q);
+    for (int c = 0; c < system->contacts; c++) {
+        const double rounding = ROUNDINGS * DBL_EPSILON * larger(x->extent[c], s->stepped.terms[system->contact[c]]);
+        const double path = x->extent[c] < x->height[c] ? x->extent[c] : x->height[c];
+        x->gap[c] = larger(x->gap[c], larger(rounding, TOUCH * path));
+    }
+}
+
+double nominals_fall(const Solver *s, int c) {
+    const Mechanism *b = &s->stepped;
+    const int k = s->system->contact[c];
+    const double span = mechanism_row_size(b, k, s->state.span), height = s->state.height[c];
+    const double way = !(height > s->state.gap[c]) ? span : span > 0 && span < height ? span : height;
+    return sqrt(mechanism_row_size(b, k, s->state.felt)) * sqrt(way);
+}
+
 double nominals_natural(const Solver *s, int j) {
     const int nq = s->system->nq;
-    return j < nq ? s->state.size[j] : s->state.span[j - nq] * s->state.now.rate;
+    if (j < nq) return s->state.size[j];
+    const double own = sqrt(s->state.span[j - nq]) * sqrt(s->state.felt[j - nq]);
+    const double natural = s->state.span[j - nq] * s->state.now.rate;
+    return own > 0 && (own < natural || !(natural > 0)) ? own : natural;
 }
 
 int nominals_incomplete(const Solver *s) {
@@ -197,9 +241,6 @@ static void find_felt(const Mechanism *b, double *work, double *felt) {
         if (sqrt(work[j]) * felt[j] < DBL_EPSILON * most) felt[j] = 0;
 }
 
-/* A rate whose square is a double too. */
-static double bounded(double rate) { return rate < FASTEST ? rate : FASTEST; }
-
 /* |v| / span and sqrt(pull / span) of one speed, the larger; an angle's speed by 1 rad. */
 static double rate_of_speed(const Solver *s, int i, double v, double pull) {
     const double size = s->state.span[i];
@@ -226,14 +267,24 @@ static double slowest_rate(const Solver *s) {
     return slowest;
 }
 
+/* The largest rate at which speeds go through sizes that rows tell, or turn angles: that of a place says nothing. */
+static double moving_rate(const Solver *s, const double *least) {
+    double rate = 0;
+    for (int i = 0; i < s->system->nv; i++)
+        if (mechanism_reach(&s->stepped, least, i) > 0 || s->system->speed_dimension[i] == s->system->angles)
+            rate = larger(rate, rate_of_speed(s, i, s->state.v[i], 0));
+    return rate;
+}
+
 /* own (nq): the rate by which a coordinate takes its size from the motion; 0 for those that have one.  One that
  * is hardly pushed moves no farther than the others do.  The largest rate that the motion itself gives is
- * returned. */
-static double find_own(Solver *s, double span, const double *felt, double *own) {
+ * returned; `moving`: that of the speeds. */
+static double find_own(Solver *s, double span, const double *felt, double *own, double *moving) {
     const System *system = s->system;
     double *least = s->work_initial, steady = 0, natural = 0;
     nominals_extents(system, s->p, least);
     const double slowest = slowest_rate(s);
+    *moving = moving_rate(s, least);
     for (int i = 0; i < system->nv; i++)
         if (mechanism_reach(&s->stepped, least, i) > 0 || system->speed_dimension[i] == system->angles)
             steady = larger(steady, rate_of_speed(s, i, s->state.v[i], felt[i]));
@@ -323,18 +374,17 @@ static double find_natural_rate(const Solver *s, double span, const double *felt
     double rate = natural, forced = 0;
     for (int j = 0; j < s->system->nv; j++) {
         const double returns = back[j] > LOST / DISPLACED * felt[j] ? back[j] : 0;
-        rate = larger(rate, rate_of_speed(s, j, s->state.v[j], resting ? returns : s->stepped.vdot[j]));
+        rate = larger(rate, rate_of_speed(s, j, 0, resting ? returns : s->stepped.vdot[j]));
         forced = larger(forced, rate_of_speed(s, j, s->state.v[j], felt[j]));
     }
     if (!(rate > 0)) rate = forced;
     return rate > 0 ? rate : span > 0 ? 1 / span : 0;
 }
 
-/* Sizes of the coordinates that take them from the motion, and the gaps in which contacts touch. */
+/* Sizes of the coordinates that take them from the motion. */
 static void take_sizes(Solver *s, const double *felt, const double *own) {
     const System *system = s->system;
     const Mechanism *b = &s->stepped;
-    double *reach = s->work_initial;
     int taken = 0;
     for (int j = 0; j < system->nq; j++) {
         if (!(own[j] > 0) || s->state.size[j] > 0) continue;
@@ -347,12 +397,7 @@ static void take_sizes(Solver *s, const double *felt, const double *own) {
             if (own[i] > 0 && system->dimension[i] == system->dimension[j]) s->state.size[i] = size;
         taken = 1;
     }
-    if (!taken) return;
-    find_spans(s);
-    for (int i = 0; i < system->nv; i++) reach[i] = larger(mechanism_reach(b, s->state.q, i), s->state.span[i]);
-    for (int c = 0; c < system->contacts; c++)
-        s->state.gap[c] =
-            larger(s->state.gap[c], TOUCH * mechanism_row_size(b, system->contact[c], reach));
+    if (taken) find_spans(s);
 }
 
 /* No smaller than what rounding in values of the coordinate's size allows at this tolerance. */
@@ -363,9 +408,10 @@ static Status find_scales(Solver *s, const double *own, const double *shaken) {
     const double roundings = fmin(larger(SHAKEN * s->settings.tolerance, 0.01), 10);
     for (int j = 0; j < nq; j++) state->scale[j] = positive(larger(state->scale[j], floor * state->size[j]));
     for (int i = 0; i < s->system->nv; i++) {
-        const double taken = mechanism_reach(&s->stepped, own, i), rate = taken > 0 ? taken : state->now.rate;
+        const double taken = mechanism_reach(&s->stepped, own, i);
+        const double natural = taken > 0 ? state->span[i] * taken : nominals_natural(s, nq + i);
         const double shakes = roundings / s->settings.tolerance * shaken[i];
-        const double speed = larger(floor * state->span[i] * rate, shakes);
+        const double speed = larger(floor * natural, shakes);
         state->scale[nq + i] = positive(larger(state->scale[nq + i], speed));
     }
     for (int j = 0; j < system_states(s->system); j++) {
@@ -380,9 +426,11 @@ Status nominals_complete(Solver *s, Instant at, double span) {
     const int n = s->system->nq;
     double *felt = s->work_initial + n, *own = felt + n, *back = own + n, *shaken = back + n;
     find_felt(&s->stepped, s->work_initial, felt);
-    const double natural = find_own(s, span, felt, own);
+    memcpy(s->state.felt, felt, (size_t)s->system->nv * sizeof *felt);
+    double moving;
+    const double natural = find_own(s, span, felt, own, &moving);
     if (find_held(s, at, back, shaken) != OK) return FAILED;
-    if (!(s->state.now.rate > 0)) s->state.now.rate = find_natural_rate(s, span, felt, back, natural);
+    if (!(s->state.now.rate > 0)) s->state.now.rate = find_natural_rate(s, span, felt, back, larger(natural, moving));
     for (int i = 0; i < s->system->nv; i++) /* what rows hold still is shaken by rounding of their forces */
         if (s->state.now.rate > 0 && fabs(s->stepped.vdot[i]) <= LOST * felt[i])
             shaken[i] = larger(shaken[i], DBL_EPSILON * felt[i] / s->state.now.rate);

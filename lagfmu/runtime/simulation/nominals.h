@@ -5,7 +5,7 @@
 #include "linkage.h"
 #include "solver.h"
 
-/* least (nq): for each coordinate the largest parameter of its dimension; 0 for an angle. */
+/* least (nq): for each coordinate the largest parameter of its dimension that stands in its rows; 0 for an angle. */
 SHARED void nominals_extents(const System *s, const double *p, double *least);
 
 /* state.size and state.span at q; 0 where there is none.  Before: the sizes before q was projected, or 0. */
@@ -16,13 +16,25 @@ SHARED void nominals_sizes(Solver *s, Instant at, const double *q);
  * matrix ties it; angles with which a constraint does.  So the steps are the same in whatever frame. */
 SHARED void nominals_shared(const Solver *s, const double *y, double *shared);
 
-/* What y[j] is as large as: the size of a coordinate; of a speed that which the natural rate gives it. */
+/* Notes how far open contacts have been, and their largest terms there; stepped.f is f at q. */
+SHARED void nominals_watch(Solver *s, Instant at, const double *q);
+
+/* The gaps in which contacts touch, which only grow: roundings of the terms of f, and a part of the farthest that f
+ * has been, or of its largest term there if that is less: so that bounces end. */
+SHARED void nominals_gaps(Solver *s, Instant at, const double *q);
+
+/* The speed [of f, per second] that the forces of the start give contact c on the way that it has been, or, if it has
+ * never opened, in the sizes of what it holds.  Of the G that was evaluated last. */
+SHARED double nominals_fall(const Solver *s, int c);
+
+/* What y[j] is as large as: the size of a coordinate; of a speed that which forces give it within what
+ * it moves, or the natural rate, if that is less or there are no forces. */
 SHARED double nominals_natural(const Solver *s, int j);
 
 /* 1 while a size, or the rate, is not known. */
 SHARED int nominals_incomplete(const Solver *s);
 
-/* Sizes, rate, scales and gaps as far as they can be known; scales only grow.  `stepped` holds the
+/* Sizes, rate and scales as far as they can be known; scales only grow.  `stepped` holds the
  * motion at the state and instant; span [s]: of the first step, or 0 while there is none.  FAILED if one
  * is not finite. */
 SHARED Status nominals_complete(Solver *s, Instant at, double span);

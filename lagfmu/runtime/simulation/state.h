@@ -130,6 +130,9 @@ static inline int column_size(const System *s) { return column_of_loss(s) + 1; }
     A(double, scale, s->nq + s->nv, SIZE, "scales")           /* below which errors in q and v are measured absolutely */ \
     A(double, size, s->nq, SIZE, "sizes")                     /* the coordinates' magnitudes, for rounding */        \
     A(double, span, s->kinematics != NULL ? s->nv : 0, SIZE, "sizes") /* those of what each speed moves; no array: size */ \
+    A(double, felt, s->nv, SIZE, "accelerations")             /* that forces gave at the start, before they cancel */ \
+    A(double, height, s->contacts, SIZE, "gaps")              /* the farthest that an open contact has been, ... */  \
+    A(double, extent, s->contacts, SIZE, "gaps")              /* ... and the largest term of its f there */          \
     A(double, gap, s->contacts, SIZE, "gaps")                 /* |f| below which a contact touches */                \
     A(int, basis, s->m, FLAG, "rank of the constraints")      /* rows that act, as many as were independent there */ \
     A(int, closed, s->contacts, FLAG, "modes")                                                                       \

@@ -39,7 +39,7 @@ void stick_slip_renew_noise(Solver *s, StickSlip *modes) {
     double *speed = s->work_contacts;
     for (int j = 0; j < s->system->nv; j++)
         speed[j] = fmax(fmax(fabs(s->state.v[j]), fabs(before[j])),
-                        fmin(s->state.span[j] * s->state.now.rate, DBL_MAX));
+                        sqrt(s->state.span[j]) * sqrt(s->state.felt[j]));
     stick_slip_set_noise(s, speed, modes);
 }
 
