@@ -5,11 +5,11 @@
 
 The rows of a coordinate are those of the constraints and of M in which it stands.  No parameter counts that
 stands in none of them, as in a force alone: it says nothing of where the motion goes.  A coordinate without
-any takes the largest of the others of its dimension; if there is none either and it is at 0, it has no
-size: its 0 is a mark on a ruler.  There the motion itself tells what is large, V tau and A tau^2 with V and A the
-largest speed and acceleration of its dimension: tau is the shortest time in which anything changes, 1/rate of the
-coordinates that have a size, or V/A.  Rows and angles alone give that rate (a place may be far away, and says
-nothing), and V/A the forces before they cancel.
+any takes the largest of the others of its dimension; if there is none either and it is at 0, it has no size:
+its 0 is a mark on a ruler.  There the motion itself tells what is large, V tau and A tau^2 with V and A the
+largest speed and acceleration of its dimension: tau is the shortest time in which anything changes, 1/rate of
+the coordinates that have a size, or V/A.  Rows and angles alone give that rate (a place may be far away, and
+says nothing), and V/A the forces before they cancel.
 
 A displacement of each coordinate tells what holds it: dvdot, were it displaced by its size.  At rest on
 springs that balance, what is left of the acceleration is rounding, and sqrt(|dvdot| / size) is the rate.

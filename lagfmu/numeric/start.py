@@ -22,7 +22,7 @@ from .motion import NONE, motion, stick_slip
 from .nominals import in_speeds, motion_speeds, natural, sizes
 from .start_priority import GIVEN, Moved
 from .system import Sparse, System, Vector
-from .thresholds import LARGEST_ANGLE, ROUNDINGS, TOUCH
+from .thresholds import LARGEST_ANGLE, LOST, ROUNDINGS, TOUCH
 
 SMALLEST_MASS = float(np.finfo(float).tiny)  # below it a double has fewer digits
 MOVED = 1e-12  # part of a value by which it has moved
@@ -160,8 +160,9 @@ def _velocities(
     mass = np.where(M.diagonal() > 0, M.diagonal(), np.inf)
     span = in_speeds(system, size)
     free = np.sqrt(span * np.abs(F) / mass)  # speeds that the forces alone would give
-    unit = np.abs(G) @ motion_speeds(system, M, np.maximum(np.abs(v0), free))
-    rising = (G @ v0 - nu > TOUCH * unit)[list(system.contacts)]
+    own = np.maximum(np.abs(v0), free)
+    least = np.maximum(TOUCH * own, LOST * motion_speeds(system, M, own))
+    rising = (G @ v0 - nu > np.abs(G) @ least)[list(system.contacts)]
     shut = [touches and not rises for touches, rises in zip(near, rising, strict=True)]
     while True:
         rows = system.active(shut)

@@ -15,7 +15,7 @@ static const double UNDONE = 10; /* times what accelerations did since a slip wa
 static void add_noise_at_work(Solver *s) {
     double *speed = s->work_contacts, *reach = speed + s->system->nv;
     mechanism_at_work(&s->stepped, speed, reach);
-    for (int j = 0; j < s->system->nv; j++) speed[j] = sqrt(s->state.size[j]) * sqrt(reach[j]);
+    for (int j = 0; j < s->system->nv; j++) speed[j] = sqrt(s->state.span[j]) * sqrt(reach[j]);
     stick_slip_set_noise(s, speed, s->state.stick_slip);
 }
 

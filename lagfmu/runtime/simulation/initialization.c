@@ -175,8 +175,8 @@ static Status find_velocities(const Start *x) {
     mechanism_motion_speeds(b, fastest, shared);
     for (int c = 0; c < s->contacts; c++) {
         int k = s->contact[c];
-        double speed = mechanism_slip(b, k, x->v0);
-        if (speed > TOUCH * mechanism_row_size(b, k, shared)) state->closed[c] = 0;
+        double speed = mechanism_slip(b, k, x->v0), own = TOUCH * mechanism_row_size(b, k, fastest);
+        if (speed > fmax(own, LOST * mechanism_row_size(b, k, shared))) state->closed[c] = 0;
     }
     while (low) {
         if (move_velocities(x, active, natural) == FAILED) return initial_refused(x->s);

@@ -7,12 +7,12 @@
  *
  * Its rows are those of the constraints and of M in which it stands.  No parameter counts that stands in none of
  * them, as in a force alone: it says nothing of where the motion goes.  A coordinate without any takes the largest of
- * the others of its dimension; if there are none either and it is at 0, it has no size: its 0 is a mark on a ruler.
- * There the motion itself tells what is large, V tau and A tau^2 with V and A the largest speed and acceleration of its dimension: tau is the shortest time in which anything changes,
- * 1/rate of the coordinates that have a size, or V/A.  Too small a size is safe, an error is then
- * measured by the motion reached so far; too large a one hides errors.  Hence rows and angles
- * alone give that rate (a place may be far away, and says nothing), and V/A the forces before they
- * cancel.
+ * the others of its dimension; if there is none either and it is at 0, it has no size: its 0 is a mark on a ruler.
+ * There the motion itself tells what is large, V tau and A tau^2 with V and A the largest speed and acceleration of
+ * its dimension: tau is the shortest time in which anything changes, 1/rate of the coordinates that have a size, or
+ * V/A.  Too small a size is safe, an error is then measured by the motion reached so far; too large a one hides
+ * errors.  Hence rows and angles alone give that rate (a place may be far away, and says nothing), and V/A the forces
+ * before they cancel.
  *
  * Speeds that are no rates of coordinates move several of these: what such a speed moves is as large as the
  * largest of its own dimension (mechanism_reach()), and its span takes the place of the size.
