@@ -66,7 +66,9 @@ def test_a_block_on_an_incline_sticks_or_slips_for_its_nominals(slope, slip):
     """From rest it sticks up to tan(alpha) = mu; beyond, and while it slips, its rate is that of
     a = g (sin(alpha) -+ mu cos(alpha)) through L = 1.5 m, the height of the floor."""
     parameters = [replace(p, value=slope) if p.symbol == alpha else p for p in BLOCK.parameters]
-    start = prepare(replace(BLOCK, parameters=parameters, start={y: 1.5, x.diff(): slip})).structure.start
+    start = prepare(
+        replace(BLOCK, parameters=parameters, start={y: 1.5, x.diff(): slip})
+    ).structure.start
     assert start.closed == (True,)
     a = g * (np.sin(slope) - (np.sign(slip) or 1.0) * 0.4 * np.cos(slope))
     if slip == 0.0 and np.tan(slope) <= 0.4:
