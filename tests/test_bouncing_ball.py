@@ -30,7 +30,7 @@ def test_it_rests_when_the_bounces_have_accumulated(native_fmu, case):
     end = (v0 + w) / G + 2 * w * e / (G * (1 - e))
     if v0 == 0:
         assert end == pytest.approx(np.sqrt(2 * h / G) * (1 + e) / (1 - e), rel=1e-12)
-    # it rests once v^2/(2 g) is 1e-9 of the highest that it has been; the rest of the bounces would have taken
+    # it rests once v^2/(2 g) is 1e-9 of the highest that it has been; the other bounces would have taken
     size = w**2 / (2 * G)
     early = 2 * np.sqrt(2e-9 * size / G) / (1 - e) + 1e-8 * end
     with instance(native_fmu("BouncingBall")) as one:
