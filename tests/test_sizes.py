@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from instance import instance
+from runs import simulate_fmu
 from sympy import cos, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
@@ -204,3 +205,47 @@ def test_another_unit_gives_the_same_impacts(built, unit):
         assert one.get("closing.floor.time") == pytest.approx(
             (3 - 2.0**-13) * np.sqrt(2 / 9.81), rel=1e-9
         )
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize("model", [far_centre(), near_floor(place=1e-9)], ids=["far", "near"])
+def test_an_importers_integrator_meets_the_same_impacts(built, fmi, model):
+    """In model exchange f plus what touches is the indicator: 15 impacts too."""
+    result = simulate_fmu(
+        built(model, fmi=fmi),
+        fmi_type="ModelExchange",
+        stop_time=2.0,
+        output_interval=0.01,
+        relative_tolerance=1e-9,
+        output=["contact.floor", "closing.floor.count", "closing.floor.time"],
+    )
+    assert not result["contact.floor"][0]
+    assert result["contact.floor"][-1]
+    assert result["closing.floor.count"][-1] == 15
+    expected = (3 - 2.0**-13) * np.sqrt(2 / 9.81)
+    assert result["closing.floor.time"][-1] == pytest.approx(expected, rel=1e-4)
+
+
+@TARGETS
+@pytest.mark.parametrize("speed", [1e-3, 1.0])
+def test_a_ball_thrown_from_the_floor_bounces_by_the_way_it_makes(built, target, speed):
+    """Thrown up from z = 0 it is back after 2 v/g and makes 15 impacts by the height v^2/(2 g)."""
+    with instance(built(far_centre(0.0), target=target)) as one:
+        one.start({"der(z)": speed})
+        one.step(2.1 * speed / 9.81)
+        assert one.get("closing.floor.count") == 1
+        one.step(2 * speed / 9.81)
+        assert one.get("closing.floor.count") == 15
+        expected = (4 - 2.0**-13) * speed / 9.81
+        assert one.get("closing.floor.time") == pytest.approx(expected, rel=1e-6)
+
+
+@TARGETS
+def test_a_contact_that_starts_closed_has_closed_at_no_time(built, target):
+    """A ball that lies on the floor at the start is closed, has not been struck, and no log speaks of it."""
+    with instance(built(far_centre(0.0), target=target)) as one:
+        one.start()
+        one.step(1.0)
+        assert one.get("contact.floor")
+        assert one.get("closing.floor.count") == 0
+        assert not any("floor" in text for _, _, text in one.log)
