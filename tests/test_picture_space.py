@@ -277,10 +277,10 @@ URDF = f"""<robot name="R">
 
 def test_a_urdf_file_says_how_its_links_look(tmp_path: Path) -> None:
     """Primitives of <visual>, else of <collision>, with those of a frame that is fixed on the link; a mesh is
-    left out, and told by name."""
+    left out, and counted."""
     path = tmp_path / "r.urdf"
     path.write_text(URDF)
-    with pytest.warns(LagfmuWarning, match=r"'a.stl' of link 'a'"):
+    with pytest.warns(LagfmuWarning, match=r"'R': meshes \(1\) are left out"):
         parts = from_urdf(path)
     (base,) = parts.ground.shape
     assert base.size == (1.0, 1.0, 0.1)

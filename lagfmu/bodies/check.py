@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from ..errors import LagfmuWarning
 from ..model.elements import NAME, is_number
 from ..model.picture import Box, points_of
 from ..names import RESERVED
@@ -23,6 +25,7 @@ from .space import PAIRS
 
 PARTS = (Joint, Distance, PointOnCurve, Rolling, Gear, Contact)
 PARTS += (Gravity, SpringDamper, Torsion, Force, Torque, Motor)  # type: ignore[assignment]
+ROUNDED = 1e-3  # of the largest moment, by which an inertia may miss an inequality
 PLANES = (None, "xy")
 
 
@@ -131,7 +134,15 @@ def _of_tensor(what: str, inertia: Sequence[Any]) -> Iterator[str]:
         return
     xx, yy, zz, xy, xz, yz = [*map(float, values), 0.0, 0.0, 0.0][:6]
     least, middle, most = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]).tolist()
-    if least <= 0 or most > (least + middle) * (1 + 1e-9):
+    missed = most - (least + middle)
+    if least > 0 and 1e-9 * most < missed < ROUNDED * most:
+        warnings.warn(
+            f"{what}: its largest principal moment of inertia, {most!r} kg.m^2, is above the sum of the "
+            f"others, {least + middle!r}, by what a program rounds: it is used as it is",
+            LagfmuWarning,
+            stacklevel=2,
+        )
+    elif least <= 0 or missed > 1e-9 * most:
         yield (
             f"{what} has the principal moments of inertia {least:.6g}, {middle:.6g}, {most:.6g} kg.m^2, "
             "expected positive ones of which none is above the sum of the others: no distribution of "

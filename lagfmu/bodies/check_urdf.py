@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -40,15 +40,25 @@ COUNTS = {  # how many numbers an attribute holds
     "cylinder": {"radius": 1, "length": 1},
     "sphere": {"radius": 1},
 }
+LARGEST = 32 * 2**20  # bytes of a file
 SHAPES = ("box", "cylinder", "sphere", "mesh")
 
 
 def problems_of_text(content: bytes) -> list[str]:
     """What is no XML, or XML of which something is missing, no number, or written by macros."""
+    if len(content) > LARGEST:
+        return [
+            f"it has {len(content)} bytes, expected at most {LARGEST}: leave out what is no URDF"
+        ]
+    parser = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False)
     try:
-        root = etree.fromstring(content)
+        root = etree.fromstring(content, parser)
     except (etree.XMLSyntaxError, ValueError) as error:
         return [f"it is no XML: {error}"]
+    if root.getroottree().docinfo.doctype:
+        return [
+            "it holds a <!DOCTYPE ...>, whose entities are not read: write out what they stand for"
+        ]
     elements = [e for e in root.iter() if isinstance(e.tag, str)]
     for e in elements:
         if "xacro" in e.tag or any("${" in value for value in e.attrib.values()):
@@ -57,10 +67,13 @@ def problems_of_text(content: bytes) -> list[str]:
     if root.tag != "robot":
         return [f"its root is <{root.tag}>, expected <robot>"]
     problems = list(_of_element("the file", root))
+    fixed = {c.get("link") for j in root.iterfind("joint[@type='fixed']") for c in j.iter("child")}
     for part in root:
         if part.tag in ("link", "joint"):
             what = f"{part.tag} {part.get('name', '')!r}"
-            problems += [p for e in part.iter(*NEEDED, *COUNTS) for p in _of_element(what, e)]
+            merged = part.tag == "link" and part.get("name") in fixed
+            found = [e for e in part.iter(*NEEDED, *COUNTS) if not (merged and e.tag == "inertial")]
+            problems += [p for e in found for p in _of_element(what, e)]
             problems += [
                 f"{what} looks like <{shape.tag}>, expected {', '.join(SHAPES)}: leave it out"
                 for shape in part.iterfind(".//geometry/*")
@@ -130,9 +143,9 @@ def problems_of_tree(robot: Any) -> list[str]:
     return []
 
 
-def problems_of_parts(robot: Any, kinds: Collection[str]) -> Iterator[str]:
-    """Joints of another kind than these, with what lagfmu has not, and links that move without mass."""
-    mass = {link.name: link.inertial and link.inertial.mass for link in robot.links}
+def problems_of_parts(robot: Any, kinds: Collection[str], limits: bool) -> Iterator[str]:
+    """Joints of another kind than these, or that follow, stop or rub as none can."""
+    moving = {j.name: j for j in robot.joints if j.type in ("revolute", "continuous", "prismatic")}
     for joint in robot.joints:
         what = f"joint {joint.name!r}"
         if joint.type not in kinds:
@@ -140,22 +153,35 @@ def problems_of_parts(robot: Any, kinds: Collection[str]) -> Iterator[str]:
                 f"{what} is of the type {joint.type!r}, expected one of {', '.join(kinds)}: build it from "
                 "bodies and joints of lagfmu"
             )
-        if joint.mimic is not None:
-            of, ratio, offset = joint.mimic.joint, joint.mimic.multiplier, joint.mimic.offset
-            gear = f"Gear(NAME, {joint.name!r}, {of!r}, {ratio!r}{f', {offset!r}' * bool(offset)})"
-            yield f"{what} mimics {of!r}: leave the mimic out, and add {gear} to the joints"
-        if friction := number_of_dynamics(joint, "friction"):
-            yield (
-                f"{what} has the friction {friction!r}, which no normal force limits: leave it out, and give "
-                "the joint of lagfmu a coefficient of friction"
-            )
+        if joint.mimic is not None and joint.type != "fixed":
+            if joint.mimic.joint not in moving or joint.name not in moving:
+                yield (
+                    f"{what} mimics {joint.mimic.joint!r}, expected a hinge or a slide that follows another "
+                    "of this file: correct the name"
+                )
+            elif joint.name in _followed(moving, joint):
+                yield f"{what} mimics itself: leave out the <mimic> of one joint"
+            if not joint.mimic.multiplier:
+                yield f"{what} mimics with the multiplier 0: make it a fixed joint"
+        if (friction := number_of_dynamics(joint, "friction")) < 0:
+            yield f"{what} has the friction {friction!r}, expected a number of at least 0"
         if joint.type != "fixed" and joint.axis is not None and not np.linalg.norm(joint.axis) > 0:
             yield f"{what} has the axis {joint.axis.tolist()}, expected a direction"
-        if joint.type != "fixed" and not mass.get(joint.child, True):
+        stops = joint.limit if joint.name in moving and joint.type != "continuous" else None
+        if limits and stops and (stops.lower or 0.0) > (stops.upper or 0.0):
             yield (
-                f"link {joint.child!r} moves and has no inertia: give it an <inertial> with mass and "
-                "inertia, or a fixed joint to a link that has one"
+                f"{what} has the limits {stops.lower!r}, {stops.upper!r}, expected the smaller first: "
+                "exchange them, or read it with limits=False"
             )
+
+
+def _followed(moving: Mapping[str, Any], joint: Any) -> set[str]:
+    """The joints that a joint follows."""
+    found: set[str] = set()
+    while joint is not None and joint.mimic is not None and joint.mimic.joint not in found:
+        found.add(joint.mimic.joint)
+        joint = moving.get(joint.mimic.joint)
+    return found
 
 
 def number_of_dynamics(joint: Any, name: str) -> float:

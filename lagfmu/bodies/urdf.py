@@ -2,14 +2,15 @@
 
 A link is a body whose own frame is that of the link, so that the FMU's points and inertias are those of the
 file; a joint of the file keeps its name, and what it drives turns about the z axis of a marker that is laid
-along the file's axis.  The root link is the ground.
+along the file's axis.  Links that are fixed to another are one body with it.  The root link is the ground, or
+with base='floating' a body.
 """
 
 from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
@@ -22,11 +23,20 @@ from ..errors import LagfmuWarning, ModelError
 from ..model.picture import Box, Rod, Shape, Sphere
 from .body import Body, Ground, Marker
 from .check_urdf import number_of_dynamics, problems_of_parts, problems_of_text, problems_of_tree
-from .joints import Fixed, Joint, Prismatic, Revolute
+from .joints import Fixed, Gear, Joint, Planar, Prismatic, Revolute
 from .loads import Torsion
-from .rotation import onto
+from .rotation import onto, quaternion
+from .words import words_of
 
-KINDS = {"revolute": Revolute, "continuous": Revolute, "prismatic": Prismatic, "fixed": Fixed}
+KINDS: dict[str, Any] = {
+    "revolute": Revolute,
+    "continuous": Revolute,
+    "prismatic": Prismatic,
+    "fixed": Fixed,
+    "planar": Planar,
+    "floating": None,  # leaves its child free
+}
+BASES = ("fixed", "floating")
 PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # xx, yy, zz, xy, xz, yz
 UP = np.array([0.0, 0.0, 1.0])
 Pose = NDArray[np.float64]  # (4, 4) homogeneous
@@ -36,30 +46,48 @@ Pose = NDArray[np.float64]  # (4, 4) homogeneous
 class Parts:
     """What a URDF file holds: pass it on to `mechanism`, with loads and motors of your own beside it.
 
-    `loads` are the dampers of its joints; `frames` names the links without mass that are fixed to another:
-    each is a marker, not a body.  Bodies and ground look as the file says, by boxes, cylinders and spheres.
+    `joints` hold a gear for each <mimic>; `loads` are the dampers.  `frames` names the links that are fixed
+    to another: each is a marker.  `start` puts every joint at 0, or in the middle of limits that leave 0 out;
+    `description` tells of other names than those of the file, and of what was left out.
     """
 
     name: str
     ground: Ground
     bodies: tuple[Body, ...]
-    joints: tuple[Joint, ...]
+    joints: tuple[Joint | Gear, ...]
     loads: tuple[Torsion, ...]
     frames: dict[str, Marker]
+    start: dict[str, Any]
+    description: str
 
 
-def from_urdf(file: str | os.PathLike[str], limits: bool = True) -> Parts:
+def from_urdf(
+    file: str | os.PathLike[str],
+    limits: bool = True,
+    base: str = "fixed",
+    fold_fixed: bool = True,
+) -> Parts:
     """The bodies and joints of a URDF file; without `limits` its joints do not stop where it says so.
 
-    Raises ModelError with every problem at once: what is no number, links without inertia that move, mimic
-    joints, joints of a kind that there is not, links with two parents or none, friction in a joint.
+    With base='floating' the root link moves freely.  Without `fold_fixed` each link that is fixed to another,
+    and has mass and inertia, is a body, so that the wrench between them is told.
+
+    Raises ModelError with every problem at once: what is no number, links without inertia that move, joints
+    of a kind that there is not, links with two parents or none, names that become one.
     """
+    if base not in BASES:
+        raise ModelError(Path(file).name, [f"base is {base!r}, expected 'fixed' or 'floating'"])
     robot = _read(Path(file))
-    problems = [*problems_of_tree(robot), *problems_of_parts(robot, KINDS)]
+    problems = [*problems_of_tree(robot), *problems_of_parts(robot, KINDS, limits)]
     if problems:
         raise ModelError(str(robot.name), problems)
-    _tell_of_meshes(robot)
-    return _Builder(robot, limits).parts()
+    builder = _Builder(robot, limits, base == "floating", fold_fixed)
+    if builder.problems:
+        raise ModelError(str(robot.name), builder.problems)
+    left = _left_out(robot)
+    if left:
+        warnings.warn(f"{robot.name!r}: {left}", LagfmuWarning, stacklevel=2)
+    return builder.parts(left)
 
 
 def _read(path: Path) -> Any:
@@ -87,89 +115,210 @@ def _root(robot: Any) -> str:
 
 
 def _mass(link: Any) -> float:
-    return float(link.inertial.mass) if link.inertial is not None else 0.0
+    return float(link.inertial.mass or 0.0) if link.inertial is not None else 0.0
+
+
+def _tensor(link: Any) -> Pose:
+    """The inertia about the centre of mass (3, 3), in the link's axes."""
+    if link.inertial is None or link.inertial.inertia is None:
+        return np.zeros((3, 3))
+    R = _pose(link.inertial.origin)[:3, :3]
+    found: Pose = R @ np.array(link.inertial.inertia, dtype=float) @ R.T
+    return found
 
 
 class _Builder:
-    """Links in the order in which the tree reaches them."""
+    """Links in the order in which the tree reaches them; a link's carrier is the body that it is part of."""
 
-    def __init__(self, robot: Any, limits: bool) -> None:
-        self.robot, self.limits = robot, limits
+    def __init__(self, robot: Any, limits: bool, floating: bool, fold: bool) -> None:
+        self.robot, self.limits, self.floating, self.fold = robot, limits, floating, fold
         self.links = {link.name: link for link in robot.links}
-        self.shapes = self._shapes()
-        self.ground = Ground(shape=self.shapes[_root(robot)] or None)
-        self.carrier: dict[str, tuple[Body | Ground, Pose]] = {}  # of each link's frame
-        self.bodies: list[Body] = []
-        self.joints: list[Joint] = []
-        self.loads: list[Torsion] = []
-        self.frames: dict[str, Marker] = {}
-
-    def parts(self) -> Parts:
-        """The whole of it."""
-        self.carrier[_root(self.robot)] = self.ground, np.eye(4)
-        waiting = list(self.robot.joints)
-        while waiting:
-            joint = next(j for j in waiting if j.parent in self.carrier)
-            waiting.remove(joint)
-            self._add(joint)
-        return Parts(
-            str(self.robot.name),
-            self.ground,
-            tuple(self.bodies),
-            tuple(self.joints),
-            tuple(self.loads),
-            self.frames,
+        self.root = _root(robot)
+        self.joints = list(_along_tree(robot, self.root))
+        self.carrier: dict[str, tuple[str, Pose]] = {self.root: (self.root, np.eye(4))}
+        self.place = {self.root: np.eye(4)}  # in the ground, every joint at 0
+        for j in self.joints:
+            own = j.type != "fixed" or self._stays_alone(self.links[j.child])
+            on, pose = self.carrier[j.parent]
+            there = np.eye(4) if own else pose @ _pose(j.origin)
+            self.carrier[j.child] = (j.child if own else on), there
+            self.place[j.child] = self.place[j.parent] @ _pose(j.origin)
+        self.own = [n for n, (on, _) in self.carrier.items() if n == on]
+        self.words, self.problems = words_of(
+            [n for n in self.own if n != self.root or floating],
+            [j.name for j in self.joints if self._moves(j)],
         )
+        self.bodies = self._bodies()
 
-    def _shapes(self) -> dict[str, list[Shape]]:
-        """What each link looks like, with the links that are markers on it."""
-        found: dict[str, list[Shape]] = {}
-        for name, link in self.links.items():
-            pose = np.eye(4)
-            while (joint := self._marker_joint(link)) is not None:
-                pose = _pose(joint.origin) @ pose
-                link = self.links[joint.parent]
-            found.setdefault(link.name, []).extend(_shapes(self.links[name], pose))
+    def _stays_alone(self, link: Any) -> bool:
+        return not self.fold and _mass(link) > 0 and bool((np.diag(_tensor(link)) > 0).all())
+
+    def _moves(self, joint: Any) -> bool:
+        return KINDS[joint.type] is not None and self.carrier[joint.child][0] == joint.child
+
+    def _bodies(self) -> dict[str, Body | Ground]:
+        """Of each link that is its own carrier, with what is fixed to it."""
+        found: dict[str, Body | Ground] = {}
+        for name in self.own:
+            parts = [(self.links[n], pose) for n, (on, pose) in self.carrier.items() if on == name]
+            shapes = [shape for link, pose in parts for shape in _shapes(link, pose)] or None
+            if name == self.root and not self.floating:
+                found[name] = Ground(shape=shapes)
+                continue
+            mass, center, J = _together(parts)
+            if not mass > 0 or not (np.diag(J) > 0).all():
+                what = "mass" if not mass > 0 else "inertia"
+                self.problems.append(
+                    f"link {name!r} moves and has no {what}: give it an <inertial> with mass and inertia, or "
+                    "a fixed joint to a link that has one"
+                    + ("; or leave base='floating' out" if name == self.root else "")
+                )
+            inertia = tuple(float(J[pair]) for pair in PAIRS)
+            word = self.words.links.get(name, name)
+            told = f"link {name!r} of the file" if word != name else ""
+            found[name] = Body(
+                word, mass, inertia, tuple(map(float, center)), description=told, shape=shapes
+            )
         return found
 
-    def _marker_joint(self, link: Any) -> Any:
-        """The fixed joint that makes a link without mass a marker on another."""
-        to = (j for j in self.robot.joints if j.child == link.name and j.type == "fixed")
-        return None if _mass(link) else next(to, None)
+    def parts(self, left: str) -> Parts:
+        """The whole of it."""
+        joints: list[Joint | Gear] = []
+        loads: list[Torsion] = []
+        start: dict[str, Any] = {}
+        if self.floating:
+            start |= self._free(self.root)
+        for j in self.joints:
+            if j.type == "floating":
+                start |= self._free(j.child)
+            if not self._moves(j):
+                continue
+            joints.append(self._joint(j))
+            if (damping := number_of_dynamics(j, "damping")) and self._rubs(j):
+                name = self.words.joints[j.name]
+                loads.append(Torsion(f"{name}_damper", name, damping=damping))
+        moving = [j for j in self.joints if self._moves(j) and j.type != "fixed"]
+        for j in moving:
+            start[self._measure(j)] = self._start(j)
+        gears = [j for j in moving if j.mimic is not None]
+        for j in gears:
+            of = self.words.joints[j.mimic.joint]
+            name = self.words.joints[j.name]
+            ratio, offset = (float(x) for x in (j.mimic.multiplier, j.mimic.offset))
+            joints.append(Gear(f"{name}_mimic", name, of, ratio, offset))
+        return Parts(
+            self.words.name(str(self.robot.name)),
+            next((b for b in self.bodies.values() if isinstance(b, Ground)), Ground()),
+            tuple(b for b in self.bodies.values() if isinstance(b, Body)),
+            tuple(joints),
+            tuple(loads),
+            {
+                n: _marker(self.bodies[on], pose)
+                for n, (on, pose) in self.carrier.items()
+                if n != on
+            },
+            start,
+            "; ".join([*self.words.told(), *([left] if left else []), *self._efforts()]),
+        )
 
-    def _add(self, joint: Any) -> None:
-        carrier, pose = self.carrier[joint.parent]
+    def _rubs(self, joint: Any) -> bool:
+        return joint.type in ("revolute", "continuous", "prismatic")
+
+    def _measure(self, joint: Any) -> str:
+        kind = "position" if joint.type == "prismatic" else "angle"
+        return f"{kind}.{self.words.joints[joint.name]}"
+
+    def _free(self, link: str) -> dict[str, Any]:
+        """Where a body that nothing holds begins."""
+        body, place = self.bodies[link], self.place[link]
+        assert isinstance(body, Body)
+        at = place[:3, 3] + place[:3, :3] @ np.array(body.center, dtype=float)
+        return {
+            f"{body.name}.position": tuple(map(float, at)),
+            f"{body.name}.orientation": tuple(map(float, quaternion(place[:3, :3]))),
+        }
+
+    def _stops(self, joint: Any) -> tuple[float, float] | None:
+        """Its limits; those of a joint that follows another are those of the other."""
+        limited = self.limits and joint.limit is not None and joint.mimic is None
+        if not limited or joint.type not in ("revolute", "prismatic"):
+            return None
+        lower, upper = joint.limit.lower or 0.0, joint.limit.upper or 0.0
+        return (float(lower), float(upper)) if lower < upper else None
+
+    def _start(self, joint: Any) -> float:
+        if joint.mimic is not None:
+            by_name = {j.name: j for j in self.joints}
+            other = self._start(by_name[joint.mimic.joint])
+            return float(joint.mimic.multiplier) * other + float(joint.mimic.offset)
+        stops = self._stops(joint)
+        return 0.0 if stops is None or stops[0] <= 0 <= stops[1] else sum(stops) / 2
+
+    def _joint(self, joint: Any) -> Joint:
+        on, pose = self.carrier[joint.parent]
         pose = pose @ _pose(joint.origin)
-        link = self.links[joint.child]
-        if self._marker_joint(link) is not None:
-            self.carrier[link.name] = carrier, pose
-            self.frames[link.name] = _marker(carrier, pose)
-            return
-        body = _body(link, self.shapes[link.name])
-        self.bodies.append(body)
-        self.carrier[link.name] = body, np.eye(4)
         turned = np.eye(4)
         if joint.type != "fixed":
             axis = (1.0, 0.0, 0.0) if joint.axis is None else joint.axis
             turned[:3, :3] = onto(UP, np.array(axis, dtype=float) / np.linalg.norm(axis))
-        kind = KINDS[joint.type]
-        stops = joint.limit if self.limits and joint.type in ("revolute", "prismatic") else None
-        limits = None if stops is None else (stops.lower or 0.0, stops.upper or 0.0)
-        first, second = _marker(carrier, pose @ turned), _marker(body, turned)
+        first = _marker(self.bodies[on], pose @ turned)
+        second = _marker(self.bodies[joint.child], turned)
+        friction = number_of_dynamics(joint, "friction") if self._rubs(joint) else 0.0
+        kind, word = KINDS[joint.type], "force" if joint.type == "prismatic" else "torque"
+        rubs = {f"friction_{word}": friction} if friction else {}
         axis_of_marker = "" if joint.type == "fixed" else "z"
-        self.joints.append(kind(joint.name, first, second, axis_of_marker, limits))
-        if damping := number_of_dynamics(joint, "damping"):
-            self.loads.append(Torsion(f"{joint.name}_damper", joint.name, damping=damping))
+        name = self.words.joints[joint.name]
+        made: Joint = kind(name, first, second, axis_of_marker, self._stops(joint), **rubs)
+        return made
+
+    def _efforts(self) -> list[str]:
+        """The limits that nothing enforces."""
+        units = {"prismatic": ("N", "m/s")}
+        told = []
+        for j in self.joints:
+            if self._moves(j) and j.limit is not None:
+                of = units.get(j.type, ("N.m", "rad/s"))
+                values = (j.limit.effort, j.limit.velocity)
+                told += [
+                    f"{self.words.joints[j.name]} {float(x):g} {unit}"
+                    for x, unit in zip(values, of, strict=True)
+                    if x
+                ]
+        return [f"limits that nothing enforces: {', '.join(told)}"] if told else []
 
 
-def _body(link: Any, shapes: list[Shape]) -> Body:
-    """The link's mass, centre and inertia, which the file gives in axes of their own, in the link's frame."""
-    origin = _pose(link.inertial.origin)
-    R = origin[:3, :3]
-    J = R @ np.array(link.inertial.inertia, dtype=float) @ R.T
-    inertia = tuple(float(J[pair]) for pair in PAIRS)
-    center = tuple(map(float, origin[:3, 3]))
-    return Body(link.name, _mass(link), inertia, center=center, shape=shapes or None)
+def _along_tree(robot: Any, root: str) -> Iterator[Any]:
+    """The joints, each behind that of its parent."""
+    reached, waiting = {root}, list(robot.joints)
+    while waiting:
+        joint = next(j for j in waiting if j.parent in reached)
+        waiting.remove(joint)
+        reached.add(joint.child)
+        yield joint
+
+
+def _together(parts: list[tuple[Any, Pose]]) -> tuple[float, Pose, Pose]:
+    """Mass [kg], centre [m] and inertia about it (3, 3) of links at poses in one frame (Steiner)."""
+    found = []
+    for link, pose in parts:
+        if link.inertial is not None:
+            R, own = pose[:3, :3], _pose(link.inertial.origin)[:3, 3]
+            found.append((_mass(link), pose[:3, 3] + R @ own, R @ _tensor(link) @ R.T))
+    if len(found) == 1:
+        return found[0]
+    mass = sum(m for m, _, _ in found)
+    if not mass > 0:
+        return 0.0, np.zeros(3), sum((J for _, _, J in found), np.zeros((3, 3)))
+    center = sum((m * c for m, c, _ in found), np.zeros(3)) / mass
+    arms = [c - center for _, c, _ in found]
+    J = sum(
+        (
+            J + m * (d @ d * np.eye(3) - np.outer(d, d))
+            for (m, _, J), d in zip(found, arms, strict=True)
+        ),
+        np.zeros((3, 3)),
+    )
+    return mass, center, J
 
 
 def _pose(origin: Any) -> Pose:
@@ -197,21 +346,16 @@ def _shapes(link: Any, pose: Pose) -> Iterator[Shape]:
             yield Sphere(tuple(center.tolist()), float(geometry.sphere.radius))
 
 
-def _tell_of_meshes(robot: Any) -> None:
-    """A mesh is not read, and that is no reason to refuse the file."""
-    left = [
-        f"{element.geometry.mesh.filename!r} of link {link.name!r}"
-        for link in robot.links
-        for element in link.visuals
-        if element.geometry.mesh is not None
-    ]
-    if left:
-        warnings.warn(
-            f"{robot.name!r}: meshes are left out of the picture, {', '.join(left)}: a link without box, "
-            "cylinder or sphere in the file is drawn by its mass and inertia",
-            LagfmuWarning,
-            stacklevel=3,
-        )
+def _left_out(robot: Any) -> str:
+    """What the file has and a mechanism has not, with counts."""
+    drawn = [e for link in robot.links for e in link.visuals]
+    counts: Mapping[str, int] = {
+        "meshes": sum(e.geometry.mesh is not None for e in drawn),
+        "transmissions": len(robot.transmission or ()),
+        "extensions of Gazebo": len(robot.gazebo or ()),
+    }
+    found = [f"{what} ({count})" for what, count in counts.items() if count]
+    return f"{', '.join(found)} are left out" if found else ""
 
 
 def _marker(carrier: Body | Ground, pose: Pose) -> Marker:
