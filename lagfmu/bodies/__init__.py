@@ -16,8 +16,10 @@ from .joints import (
     Spherical,
     Universal,
 )
-from .loads import Force, Gravity, Motor, SpringDamper, Torque, Torsion
+from .loads import Force, Gravity, Motor, Rotor, SpringDamper, Torque, Torsion
 from .mechanism import mechanism
+from .mjcf import from_mjcf
+from .series import Series
 from .urdf import from_urdf
 
 __all__ = [
@@ -37,11 +39,14 @@ __all__ = [
     "Prismatic",
     "Revolute",
     "Rolling",
+    "Rotor",
+    "Series",
     "Spherical",
     "SpringDamper",
     "Torque",
     "Torsion",
     "Universal",
+    "from_mjcf",
     "from_urdf",
     "mechanism",
 ]

@@ -17,14 +17,14 @@ from .check_ties import kind_of, problems_of_ties, value_of
 from .contacts import Contact
 from .curves import PointOnCurve
 from .joints import Distance, Gear, Joint, Rolling
-from .loads import Force, Gravity, Motor, SpringDamper, Torque, Torsion
+from .loads import Force, Gravity, Motor, Rotor, SpringDamper, Torque, Torsion
 from .picture import CARRIED, shapes_of
 from .readings import Reading
 from .rotation import problem_of
 from .space import PAIRS
 
 PARTS = (Joint, Distance, PointOnCurve, Rolling, Gear, Contact)
-PARTS += (Gravity, SpringDamper, Torsion, Force, Torque, Motor)  # type: ignore[assignment]
+PARTS += (Gravity, SpringDamper, Torsion, Force, Torque, Motor, Rotor)  # type: ignore[assignment]
 ROUNDED = 1e-3  # of the largest moment, by which an inertia may miss an inequality
 PLANES = (None, "xy")
 

@@ -12,7 +12,7 @@ from ..model.picture import Track
 from ..model.spline import Spline
 from .curves import PointOnCurve
 from .joints import Gear, Joint, Planar, Universal, name_of_joint
-from .loads import Motor, Torsion
+from .loads import Motor, Rotor, Torsion
 from .vectors import AXES
 
 
@@ -126,7 +126,7 @@ def _of_references(part: Any, parts: Sequence[Any]) -> Iterator[str]:
     """Joints that a gear, a motor or a torsion spring names."""
     if isinstance(part, Gear):
         named = [part.first, part.second]
-    elif isinstance(part, Motor | Torsion):
+    elif isinstance(part, Motor | Rotor | Torsion):
         named = [part.joint]
     else:
         return

@@ -46,7 +46,11 @@ class Wrench:
 
 @dataclass(frozen=True, eq=False)
 class Relative:
-    """The one motion that a joint leaves free: angle.A [rad] or position.A [m], and its two derivatives."""
+    """A motion that a joint leaves free: angle.A [rad] or position.A [m], and its two derivatives.
+
+    What drives it acts along an axis of the first marker, or `along` a vector in the ground's axes, and is
+    part of the wrench of the `joint`, where that bears another name.
+    """
 
     name: str
     unit: str
@@ -54,10 +58,22 @@ class Relative:
     first: Placed
     second: Placed
     axis: int
+    along: Vector | None = None
+    joint: str = ""
+
+    def transmit(self, draft: Draft, effort: Expr) -> None:
+        """The effort of a motor as part of the joint's wrench."""
+        wrench = draft.wrench(self.joint or self.name.split(".")[1])
+        acts = wrench.torque if self.unit == "rad" else wrench.force
+        if self.along is None:
+            acts[self.axis] += effort
+            return
+        for k, e in enumerate(self.first.axes):
+            acts[k] += effort * dot(e.value, self.along)
 
     def drive(self, draft: Draft, effort: Expr) -> None:
         """A torque [N.m] or force [N] along it on the second body, and its reaction on the first."""
-        e = times(effort, self.first.axes[self.axis].value)
+        e = times(effort, self.along or self.first.axes[self.axis].value)
         if self.unit == "m":
             draft.pull_together(self.first, self.second, self.second.point, e)
         else:
@@ -66,7 +82,7 @@ class Relative:
 
 
 class Curve(NamedTuple):
-    """The coordinate of a point on a curve: its unit, what moves along [kg], and what it is."""
+    """The coordinate of a point on a curve, of a rotor: its unit, what moves along, and what it is."""
 
     unit: str
     mass: Expr
@@ -93,7 +109,7 @@ class Draft:
         self.wound: set[str] = set()  # angles that something needs over many turns
         self.unwrapped: dict[Expr, tuple[Expr, Expr]] = {}  # in space: rate, and value modulo 2 pi
         self.placed: dict[Marker, Placed] = {}
-        self.curves: dict[Expr, Curve] = {}  # by the coordinate K.curve.s
+        self.curves: dict[Expr, Curve] = {}  # by the coordinate K.curve.s, K.rotor.angle
         self.readings: dict[str, Placed] = {}  # markers that are read on request, by name
         self.gravity: dict[str, Vector] = {}
 
@@ -175,19 +191,23 @@ class Draft:
         return self.placed[marker]
 
     def angle(self, name: str, a: Placed, b: Placed, axis: int) -> Timed:
-        """The angle of b about an axis of a.  In space it is a coordinate of its own, tied to the attitude
-        modulo 2 pi, where something needs it over many turns."""
+        """The angle of b about an axis of a."""
         rate = about(a, b, axis)
         if len(self.components) == 2:
             return Timed(b.angle - a.angle, rate, sp.S.Zero)
         j, k = (axis + 1) % 3, (axis + 2) % 3
         x, y, turned = a.axes[j].value, a.axes[k].value, b.axes[j].value
         within_turn = sp.atan2(dot(turned, y), dot(turned, x))
+        return self.turning(name, Timed(within_turn, rate, sp.S.Zero))
+
+    def turning(self, name: str, f: Timed) -> Timed:
+        """An angle in space: a coordinate of its own, tied to the attitude modulo 2 pi, where something needs
+        it over many turns."""
         if name not in self.wound:
-            return Timed(within_turn, rate, sp.S.Zero)
+            return f
         angle = dynamicsymbols(name)
-        self.unwrapped[angle] = rate, within_turn
-        return Timed(angle, rate, sp.S.Zero)
+        self.unwrapped[angle] = f.rate, f.value
+        return Timed(angle, f.rate, f.bend)
 
     def hold(self, name: str, f: Timed, text: str, side: Expr = 1) -> None:
         """A row f = 0, met as it is meant where `side` is positive."""

@@ -173,5 +173,7 @@ def guessed(draft: Draft, model: Model, ties: Sequence[Any], given: Mapping[str,
         else:
             values += [*pose.origin.tolist(), *quaternion(pose.axes).tolist()]
     curved = {f"{t.name}.curve.s": t for t in ties if hasattr(t, "tried")}
-    values += [given.get(n, guess.nearest(curved[n])) for n in map(name_of, draft.curves)]
+    for name in map(name_of, draft.curves):
+        value = guess.nearest(curved[name]) if name in curved else 0.0
+        values.append(given.get(name, value))
     return np.array([*values, *([0.0] * (len(model.coordinates) - len(values)))])

@@ -9,16 +9,17 @@ from typing import Any
 import sympy as sp
 
 from .. import names
+from ..model.attitude import ClosedFunction
 from ..model.closed_form import in_variables, output
 from ..model.elements import Expr, Parameter
 from ..model.laws import GROUND, Act, Laws, Where
 from .body import Body
 from .draft import Draft, Relative
 from .joints import Gear
-from .loads import Force, SpringDamper, Torque, Torsion
+from .loads import Force, Rotor, SpringDamper, Torque, Torsion
 from .motion import Placed
 from .space import PAIRS
-from .vectors import AXES, ZERO
+from .vectors import AXES, ZERO, dot
 
 EYE = tuple(sp.Integer(i == j) for i in range(3) for j in range(3))
 STILL = Where(GROUND, ZERO, EYE)
@@ -74,10 +75,17 @@ class _Acting:
 
     def drive(self, of: Relative, effort: Expr, size: Expr = 0) -> None:
         """A torque or force along the motion that a joint leaves free."""
-        along = [effort if k == of.axis else 0 for k in range(3)]
+        along = [effort * share for share in self.shares(of)]
         pair = (ZERO, along) if of.unit == "rad" else (along, ZERO)
         force, torque = pair
         self.pair(of.first, of.second, force, torque, size)
+
+    def shares(self, of: Relative) -> list[Expr]:
+        """Components along the axes of the first marker of what an effort of 1 acts along."""
+        if of.along is None:
+            return [sp.Integer(k == of.axis) for k in range(3)]
+        along = [dot(axis.value, of.along) for axis in of.first.axes]
+        return [in_variables(opened(x)) for x in along]
 
     def add(self, part: Any) -> None:
         """What a joint, a load or a contact does; a motor is in the wrench of its joint."""
@@ -96,6 +104,8 @@ class _Acting:
             effort = f"{'torque' if of.unit == 'rad' else 'force'}.{name}"
             effort, k, slack = self.told_of(part, effort, "stiffness", "angle")
             self.drive(of, effort, sp.Abs(k) * (sp.Abs(output(of.name)) + sp.Abs(slack)))
+        elif isinstance(part, Rotor):
+            self.drive(draft.motion_of(part.joint), output(names.name(names.MULTIPLIER, name)))
         elif isinstance(part, Gear):
             effort = output(names.name(names.MULTIPLIER, name))
             self.drive(draft.motion_of(part.first), effort)
@@ -141,3 +151,10 @@ class _Acting:
         for node in expression.atoms(sp.core.relational.Relational):
             self.jumps.add(in_variables(node.lhs - node.rhs))
         return in_variables(expression)
+
+
+def opened(expression: Expr) -> Expr:
+    """What is closed written out, in coordinates and speeds."""
+    while closed := expression.atoms(ClosedFunction):
+        expression = expression.xreplace({a: a.opened() for a in closed})
+    return expression

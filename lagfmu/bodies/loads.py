@@ -10,10 +10,10 @@ from typing import Any
 import sympy as sp
 from sympy.physics.vector import dynamicsymbols
 
-from ..model.elements import Expr, Holonomic, Input
+from ..model.elements import TIME, Expr, Holonomic, Input, Nonholonomic
 from ..model.reactions import multiplier
 from .body import Body, Marker, Number
-from .draft import Draft
+from .draft import Curve, Draft
 from .joints import places
 from .motion import distance
 from .vectors import AXES, Vector, times
@@ -105,6 +105,32 @@ class Torsion:
 
 
 @dataclass(frozen=True, eq=False)
+class Rotor:
+    """What turns with a joint and has its `inertia` [kg.m^2] at the rate of that alone, as the rotor of a
+    motor behind a gear of the ratio n, which has n^2 J; in a slide a mass [kg].
+
+    Kinetic energy inertia/2 der(angle.JOINT)^2; lambda.NAME is the torque [N.m] (in a slide the force [N])
+    by which it speeds up the second body: -inertia der(angle.JOINT,2).  NAME.rotor.angle counts its way
+    from the start.
+    """
+
+    name: str
+    joint: Any
+    inertia: Number
+
+    def add(self, draft: Draft) -> None:
+        """A coordinate of its own, so that M stays constant, and the row der(angle.JOINT) = its rate."""
+        name, of = self.name, draft.motion_of(self.joint)
+        unit, text = ("kg.m^2", "inertia") if of.unit == "rad" else ("kg", "mass")
+        J = draft.number(self.inertia, f"{name}.inertia", unit, f"{text} of {name}", positive=True)
+        way = dynamicsymbols(f"{name}.rotor.{of.name.split(chr(46))[0]}")
+        draft.curves[way] = Curve(of.unit, J, f"way of {name} from the start")
+        draft.kinetic.append(J * way.diff(TIME) ** 2 / 2)
+        row = of.values[1] - way.diff(TIME)
+        draft.constraints.append(Nonholonomic(name, row, f"{name} turns with {of.name}"))
+
+
+@dataclass(frozen=True, eq=False)
 class Force:
     """A force [N] at a marker, in the ground's axes, or in those of the marker if `follows`.
 
@@ -184,7 +210,6 @@ class Motor:
     def add(self, draft: Draft) -> None:
         """A generalized force on the joint's coordinate, or a row for it."""
         name, of = self.name, draft.motion_of(self.joint)
-        wrench = draft.wrench(of.name.split(".")[1])
         turns = of.unit == "rad"
         kind, unit = ("torque", "N.m") if turns else ("force", "N")
         if self.motion is None:
@@ -196,7 +221,7 @@ class Motor:
             where = self._motion(draft, f"{name}.{'angle' if turns else 'position'}", of.unit)
             text = f"motor {name} moves {of.name}"
             draft.constraints.append(Holonomic(name, of.values[0] - where, text))
-        (wrench.torque if turns else wrench.force)[of.axis] += effort
+        of.transmit(draft, effort)
         draft.report(f"{name}.power", effort * of.values[1], "W", f"power of motor {name}")
 
     def _effort(self, draft: Draft, name: str, unit: str) -> Expr:

@@ -107,6 +107,7 @@ def _wound(parts: Sequence[Any], start: Mapping[str, Any]) -> set[str]:
     named: list[Any] = [j for j in joints.values() if j.limits is not None]
     named += [j for p in parts if isinstance(p, Gear) for j in (p.first, p.second)]
     named += [p.joint for p in parts if isinstance(p, Motor | Torsion)]
+    named += [f"angle.{n}" for j in joints.values() for n in getattr(j, "stops", ())]
     called = {j if isinstance(j, str) else j.name for j in named}
     found = {n if n.startswith("angle.") else f"angle.{n}" for n in called}
     return found | {names.read(name).coordinate for name in start if "angle." in name}

@@ -1,0 +1,507 @@
+"""Bodies and joints from an MJCF file, as MuJoCo compiles it.
+
+A body keeps its frame, a joint its name and its coordinate: angle.J and position.J are those of the file.
+Constraints are rigid here.  The world is the ground, a body without joints a part of what it is on.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import warnings
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import sympy as sp
+from numpy.typing import NDArray
+from sympy.physics.vector import dynamicsymbols
+
+from ..errors import LagfmuWarning, ModelError
+from ..model.elements import Input, Parameter
+from ..model.picture import Box, Rod, Shape, Sphere
+from ..names import RESERVED
+from .body import Body, Ground, Marker
+from .check_mjcf import problems_of_files
+from .joints import Fixed, Gear, Joint, Prismatic, Revolute, Spherical
+from .loads import Gravity, Motor, Rotor, Torsion
+from .rotation import onto, turn, turned_by
+from .series import Series
+from .vectors import AXES
+
+Array = NDArray[np.float64]
+FREE, BALL, SLIDE, HINGE = range(4)  # MuJoCo's mjtJoint
+CONNECT, WELD, JOINT = range(3)  # mjtEq
+SITE = 6  # mjtObj
+SPHERE, CAPSULE, CYLINDER, BOX = 2, 3, 5, 6  # mjtGeom
+NO_GRAVITY = 1 << 7  # mjtDisableBit
+# transmission joint or joint in parent, no dynamics, a fixed gain, no bias or an affine one
+BY_JOINT = {(transmission, 0, 0, bias) for transmission in (0, 1) for bias in (0, 1)}
+PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+SQUARE = 1e-9  # cosine of two axes that are square, and what two points may differ by, relative
+
+
+@dataclass(frozen=True)
+class MjcfParts:
+    """What an MJCF file holds: `mechanism(parts.name, **parts.arguments)`, or its lists by themselves.
+
+    `loads` are gravity, springs, dampers, rotors and actuators; `frames` are the sites; `start` is the
+    configuration of the file, or a key frame of it.
+    """
+
+    name: str
+    ground: Ground
+    bodies: tuple[Body, ...]
+    joints: tuple[Any, ...]
+    loads: tuple[Any, ...]
+    frames: dict[str, Marker]
+    start: dict[str, Any]
+    inputs: tuple[Input, ...]
+    parameters: tuple[Parameter, ...]
+
+    @property
+    def arguments(self) -> dict[str, Any]:
+        """Those of `mechanism`."""
+        names = ("bodies", "joints", "loads", "start", "inputs", "parameters")
+        return {name: getattr(self, name) for name in names}
+
+
+def from_mjcf(file: str | os.PathLike[str], limits: bool = True, key: str = "") -> MjcfParts:
+    """The bodies, joints and loads of an MJCF file; without `limits` its joints do not stop where it says so;
+    `key` names the key frame at which it begins.
+
+    Raises ModelError with every problem at once.  What MuJoCo has and this has not is told once, counted.
+    """
+    path = Path(file)
+    try:
+        import mujoco
+    except ImportError:
+        raise ModelError(path.name, ["reading MJCF needs mujoco: pip install mujoco"]) from None
+    if problems := problems_of_files(path):
+        raise ModelError(path.name, problems)
+    try:
+        m = mujoco.MjModel.from_xml_path(str(path))
+    except ValueError as error:
+        text = " ".join(str(error).split())
+        raise ModelError(path.name, [f"MuJoCo does not take it: {text}"]) from None
+    return _Reader(mujoco, m, path.stem, limits, key).parts()
+
+
+class _Reader:
+    """One compiled model."""
+
+    def __init__(self, mujoco: Any, m: Any, stem: str, limits: bool, key: str) -> None:
+        self.mj, self.m, self.limits = mujoco, m, limits
+        self.problems: list[str] = []
+        self.left: Counter[str] = Counter()
+        self.taken: set[str] = {"ground"}
+        self.data = mujoco.MjData(m)
+        self.data.qpos[:] = m.qpos0
+        mujoco.mj_kinematics(m, self.data)
+        self.called = word(m.names[: m.names.index(b"\0")].decode() or stem)
+        self.key = self._key(key)
+        self.ground = Ground(shape=self._looks(self._with(0)) or None)
+        self.roots = [b if m.body_jntnum[b] else 0 for b in range(m.nbody)]
+        for b in range(1, m.nbody):
+            if not m.body_jntnum[b]:
+                self.roots[b] = self.roots[m.body_parentid[b]]
+        names = {b: self._name("body", b) for b in self._movers()}
+        self.joint_names = [self._name("joint", j) for j in range(m.njnt)]
+        self.bodies = {b: self._body(b, name) for b, name in names.items()}
+        self.inputs: list[Input] = []
+        self.parameters: list[Parameter] = []
+
+    def parts(self) -> MjcfParts:
+        """The whole of it."""
+        joints: list[Any] = (
+            [] if self.problems else [j for b in self.bodies for j in self._joints(b)]
+        )
+        if self.problems:
+            raise ModelError(self.called, self.problems)
+        joints += self._equalities()
+        loads = [*self._gravity(), *self._passive(), *self._actuators()]
+        frames = {self._name("site", s): self._site(s) for s in range(self.m.nsite)}
+        if self.problems:
+            raise ModelError(self.called, self.problems)
+        self._tell()
+        parts = tuple(self.bodies.values()), tuple(joints), tuple(loads)
+        more = tuple(self.inputs), tuple(self.parameters)
+        return MjcfParts(self.called, self.ground, *parts, frames, self._start(), *more)
+
+    # ------------------------------------------------------------------ names
+
+    def _own(self, kind: str, k: int) -> str:
+        """What the file calls it."""
+        thing = getattr(self.mj.mjtObj, f"mjOBJ_{kind.upper()}")
+        return self.mj.mj_id2name(self.m, thing, k) or f"{kind}{k}"
+
+    def _name(self, kind: str, k: int) -> str:
+        """One word of its name in the file, that nothing else has."""
+        plain = word(self._own(kind, k))
+        found = plain if plain not in self.taken | set(RESERVED) else f"{plain}_{kind}"
+        while found in self.taken:
+            found += "_"
+        self.taken.add(found)
+        return found
+
+    def _key(self, key: str) -> int:
+        known = [self._own("key", k) for k in range(self.m.nkey)]
+        if key and key not in known:
+            self.problems.append(
+                f"no key frame is called {key!r}, expected one of {', '.join(known) or 'none: it has none'}"
+            )
+        return known.index(key) if key in known else -1
+
+    # ------------------------------------------------------------------ bodies
+
+    def _movers(self) -> list[int]:
+        return [b for b in range(1, self.m.nbody) if self.m.body_jntnum[b]]
+
+    def _with(self, root: int) -> list[int]:
+        """A body of the file and those that are welded to it."""
+        m, found = self.m, [root]
+        for b in range(1, m.nbody):
+            if not m.body_jntnum[b] and m.body_parentid[b] in found:
+                found.append(b)
+        return found
+
+    def _frame(self, b: int) -> tuple[Array, Array]:
+        """Its axes and origin at the configuration of the file."""
+        return self.data.xmat[b].reshape(3, 3).copy(), self.data.xpos[b].copy()
+
+    def _body(self, root: int, name: str) -> Body:
+        """Masses, centres and inertias of all that is welded together, by Steiner's theorem."""
+        m, (R, origin) = self.m, self._frame(root)
+        those = self._with(root)
+        mass = float(sum(m.body_mass[b] for b in those))
+        centers = [R.T @ (self.data.xipos[b] - origin) for b in those]
+        center = sum(m.body_mass[b] * c for b, c in zip(those, centers, strict=True)) / (mass or 1)
+        J = np.zeros((3, 3))
+        for b, c in zip(those, centers, strict=True):
+            axes, d = R.T @ self.data.ximat[b].reshape(3, 3), c - center
+            J += axes @ np.diag(m.body_inertia[b]) @ axes.T
+            J += m.body_mass[b] * (d @ d * np.eye(3) - np.outer(d, d))
+        if not mass > 0 or not np.linalg.eigvalsh(J)[0] > 0:
+            self.problems.append(
+                f"body {self._own('body', root)!r} moves and has the mass {mass!r} and the principal moments "
+                f"{np.linalg.eigvalsh(J).tolist()!r}: give it an <inertial>, or a geom with a mass"
+            )
+        inertia = tuple(float(J[pair]) for pair in PAIRS)
+        own = self._own("body", root)
+        description = "" if own == name else f"{own!r} of the file"
+        shape = self._looks(those) or None
+        return Body(name, mass, inertia, tuple(map(float, center)), description, shape)
+
+    def _looks(self, those: Sequence[int]) -> list[Shape]:
+        R, origin = self._frame(those[0])
+        of = [g for g in range(self.m.ngeom) if self.m.geom_bodyid[g] in those]
+        return [shape for g in of for shape in self._shape(g, R, origin)]
+
+    def _shape(self, g: int, R: Array, origin: Array) -> Iterator[Shape]:
+        b = self.m.geom_bodyid[g]
+        axes, at = self._frame(b)
+        turned = axes @ turned_by(self.m.geom_quat[g])
+        own, center = R.T @ turned, R.T @ (at + axes @ self.m.geom_pos[g] - origin)
+        kind, size = int(self.m.geom_type[g]), self.m.geom_size[g].tolist()
+        where = tuple(center.tolist())
+        if kind == SPHERE:
+            yield Sphere(where, size[0])
+        elif kind in (CAPSULE, CYLINDER):
+            low, high = (tuple((center + s * size[1] * own[:, 2]).tolist()) for s in (-1, 1))
+            yield Rod(low, high, size[0])
+        elif kind == BOX:
+            yield Box(where, tuple(2 * x for x in size), own.tolist())
+
+    def _carrier(self, b: int) -> tuple[Body | Ground, Array, Array]:
+        """What a body of the file is part of, and the axes and the origin of that."""
+        root = self.roots[b]
+        return (self.bodies[root] if root else self.ground, *self._frame(root))
+
+    def _marker(self, b: int, axes: Array, point: Array) -> Marker:
+        """A frame that is given at the configuration of the file, on what a body is part of."""
+        carrier, R, origin = self._carrier(b)
+        own = R.T @ axes
+        rotation = None if np.array_equal(own, np.eye(3)) else _square(own).tolist()
+        return carrier.at(tuple((R.T @ (point - origin)).tolist()), rotation=rotation)
+
+    def _within(self, b: int, point: Any, quat: Any = None) -> Marker:
+        """A frame that is given in the frame of a body of the file."""
+        R, origin = self._frame(b)
+        turned = R if quat is None else R @ turned_by(quat)
+        return self._marker(b, turned, origin + R @ point)
+
+    def _site(self, s: int) -> Marker:
+        return self._within(self.m.site_bodyid[s], self.m.site_pos[s], self.m.site_quat[s])
+
+    # ------------------------------------------------------------------ joints
+
+    def _joints(self, b: int) -> Iterator[Joint]:
+        """The joint by which a body hangs on its parent; several of the file in one body are a Series."""
+        m = self.m
+        own = range(m.body_jntadr[b], m.body_jntadr[b] + m.body_jntnum[b])
+        kinds = [int(m.jnt_type[j]) for j in own]
+        j, parent = own[0], int(m.body_parentid[b])
+        if kinds == [FREE]:
+            if self.roots[parent]:
+                self.problems.append(f"free joint {self._own('joint', j)!r} is not on the world")
+        elif kinds == [BALL]:
+            ends: Any = [self._marker(x, np.eye(3), self.data.xanchor[j]) for x in (parent, b)]
+            self.left["limits of ball joints"] += self._has_limits(j)
+            yield Spherical(self.joint_names[j], *ends)
+        elif kinds in ([HINGE], [SLIDE]):
+            axis = self.data.xaxis[j]
+            axes = onto(np.array([0.0, 0.0, 1.0]), axis)
+            ref, point = float(m.qpos0[m.jnt_qposadr[j]]), self.data.xanchor[j]
+            first = point - ref * axis if kinds == [SLIDE] else point
+            turned = axes @ turn(2, ref) if kinds == [HINGE] else axes
+            ends = self._marker(parent, axes, first), self._marker(b, turned, point)
+            kind = Revolute if kinds == [HINGE] else Prismatic
+            rubs: dict[str, Any] = {}
+            if loss := float(m.dof_frictionloss[m.jnt_dofadr[j]]):
+                rubs["friction_torque" if kinds == [HINGE] else "friction_force"] = loss
+            yield kind(self.joint_names[j], ends[0], ends[1], "z", self._limits(j), **rubs)
+        else:
+            yield from self._series(b, parent, list(own), kinds)
+
+    def _series(self, b: int, parent: int, own: list[int], kinds: list[int]) -> Iterator[Joint]:
+        m, x = self.m, self.data.xaxis
+        slides = [j for j, kind in zip(own, kinds, strict=True) if kind == SLIDE]
+        hinges = [j for j, kind in zip(own, kinds, strict=True) if kind == HINGE]
+        axes = self._letters(slides, hinges)
+        points = np.array([self.data.xanchor[j] for j in hinges or own[-1:]])
+        apart = float(np.ptp(points, axis=0).max())
+        refs = [float(m.qpos0[m.jnt_qposadr[j]]) for j in own]
+        what = f"the joints {', '.join(repr(self._own('joint', j)) for j in own)} of one body"
+        remedy = "give each a body of its own with a mass"
+        if own != slides + hinges:
+            self.problems.append(f"{what}: expected slides first, then hinges: {remedy}")
+        elif apart > SQUARE * max(1.0, float(np.abs(points).max())):
+            self.problems.append(f"{what}: their points are {apart:.6g} m apart: {remedy}")
+        elif axes is None:
+            self.problems.append(f"{what}: their axes are not square to each other: {remedy}")
+        elif len(hinges) > 1 and any(refs[len(slides) :]):
+            self.problems.append(f"{what}: two hinges with ref=: leave it out")
+        else:
+            letters, frame = axes
+            along, about = (letters[: len(slides)], letters[len(slides) :])
+            first, turned = points[0].copy(), frame
+            for j, ref in zip(own, refs, strict=True):
+                first -= ref * x[j] if j in slides else 0.0
+                turned = turned @ turn(AXES.index(about), ref) if j in hinges and ref else turned
+            ends = self._marker(parent, frame, first), self._marker(b, turned, points[0])
+            names = [self.joint_names[j] for j in own]
+            stops = {self.joint_names[j]: s for j in own if (s := self._limits(j)) is not None}
+            name = self.bodies[b].name + "_joints"
+            while name in self.taken:
+                name += "_"
+            self.taken.add(name)
+            yield Series(name, *ends, sliding=along, turning=about, names=names, stops=stops)
+
+    def _letters(self, slides: list[int], hinges: list[int]) -> tuple[str, Array] | None:
+        """The letter of each axis in a right-handed frame that has them all; none if none has."""
+        found: list[Array] = []
+        places = []
+        for j in slides + hinges:
+            axis = self.data.xaxis[j]
+            same = [k for k, e in enumerate(found) if np.abs(e - axis).max() <= SQUARE]
+            if not same and any(abs(e @ axis) > SQUARE for e in found):
+                return None
+            places.append(same[0] if same else len(found))
+            found += [] if same else [axis.copy()]
+        if any(len({*part}) < len(part) for part in (places[: len(slides)], places[len(slides) :])):
+            return None
+        order = "xyz"
+        if len(found) == 3 and np.linalg.det(found) < 0:
+            order = "xzy"
+        elif len(found) == 2:
+            found.append(np.cross(found[0], found[1]))
+        elif len(found) == 1:
+            frame = onto(np.array([1.0, 0, 0]), found[0])
+            found += [frame[:, 1], frame[:, 2]]
+        columns = sorted(zip(order, found, strict=True), key=lambda pair: pair[0])
+        return "".join(order[k] for k in places), _square(np.array([e for _, e in columns]).T)
+
+    def _has_limits(self, j: int) -> bool:
+        return bool(self.m.jnt_limited[j]) and self.limits
+
+    def _limits(self, j: int) -> tuple[float, float] | None:
+        low, high = map(float, self.m.jnt_range[j])
+        return (low, high) if self._has_limits(j) else None
+
+    def _equalities(self) -> Iterator[Any]:
+        m = self.m
+        for e in range(m.neq):
+            kind, data = int(m.eq_type[e]), m.eq_data[e]
+            ends = int(m.eq_obj1id[e]), int(m.eq_obj2id[e])
+            if not m.eq_active0[e]:
+                self.left["equalities that are not active"] += 1
+            elif kind == JOINT:
+                yield from self._tied_joints(e, *ends)
+            elif kind not in (CONNECT, WELD):
+                self.left["equalities of tendons, flexes and distances"] += 1
+            elif m.eq_objtype[e] == SITE:
+                tie = Spherical if kind == CONNECT else Fixed
+                first, second = map(self._site, ends)
+                yield tie(self._name("equality", e), first, second)
+            elif kind == CONNECT:
+                first, second = self._within(ends[0], data[:3]), self._within(ends[1], data[3:6])
+                yield Spherical(self._name("equality", e), first, second)
+            else:
+                first = self._within(ends[0], data[3:6], data[6:10])
+                yield Fixed(self._name("equality", e), first, self._within(ends[1], data[:3]))
+
+    def _tied_joints(self, e: int, first: int, second: int) -> Iterator[Any]:
+        """q1 - ref1 = a0 + a1 (q2 - ref2)."""
+        m, a, name = self.m, self.m.eq_data[e][:5].tolist(), self._name("equality", e)
+        start = float(m.qpos0[m.jnt_qposadr[first]])
+        if any(a[2:]):
+            self.problems.append(
+                f"equality {self._own('equality', e)!r} has the polynomial {a!r}, expected one of degree 1: "
+                "write polycoef with two numbers, and the rest of it as a row of your own"
+            )
+        elif second < 0 or not a[1]:
+            yield Motor(name, self._measure(first), motion=start + a[0])
+        else:
+            offset = start + a[0] - a[1] * float(m.qpos0[m.jnt_qposadr[second]])
+            yield Gear(name, self._measure(first), self._measure(second), a[1], offset)
+
+    def _measure(self, j: int) -> str:
+        kind = "position" if self.m.jnt_type[j] == SLIDE else "angle"
+        return f"{kind}.{self.joint_names[j]}"
+
+    # ------------------------------------------------------------------ loads
+
+    def _gravity(self) -> Iterator[Gravity]:
+        if not self.m.opt.disableflags & NO_GRAVITY and self.m.opt.gravity.any():
+            yield Gravity(tuple(self.m.opt.gravity.tolist()))
+
+    def _passive(self) -> Iterator[Any]:
+        """Springs, dampers and rotors of joints of one motion."""
+        m = self.m
+        for j in range(m.njnt):
+            d, name = int(m.jnt_dofadr[j]), self.joint_names[j]
+            values = float(m.jnt_stiffness[j]), float(m.dof_damping[d]), float(m.dof_armature[d])
+            if m.jnt_type[j] in (FREE, BALL):
+                self.left["springs, dampers and armatures of free and ball joints"] += any(values)
+                continue
+            several = m.body_jntnum[m.jnt_bodyid[j]] > 1
+            self.left["friction losses of several joints in one body"] += several and bool(
+                m.dof_frictionloss[d]
+            )
+            bent = any(m.jnt_stiffnesspoly[j]) or any(m.dof_dampingpoly[d])
+            self.left["springs and dampers of higher degree"] += bent
+            if values[0] or values[1]:
+                slack = float(m.qpos_spring[m.jnt_qposadr[j]]) if values[0] else 0.0
+                spring = self._added(f"{name}_spring")
+                yield Torsion(spring, self._measure(j), values[0], slack, values[1])
+            if values[2]:
+                yield Rotor(self._added(f"{name}_rotor"), self._measure(j), values[2])
+
+    def _added(self, name: str) -> str:
+        while name in self.taken:
+            name += "_"
+        self.taken.add(name)
+        return name
+
+    def _actuators(self) -> Iterator[Any]:
+        """gain u + b0 + b1 (gear q) + b2 (gear q'), times the gear."""
+        m = self.m
+        for a in range(m.nactuator):
+            j, gear = int(m.actuator_trnid[a][0]), float(m.actuator_gear[a][0])
+            kinds = m.actuator_trntype, m.actuator_dyntype, m.actuator_gaintype, m.actuator_biastype
+            kind = tuple(int(of[a]) for of in kinds)
+            if kind not in BY_JOINT or m.jnt_type[j] in (FREE, BALL):
+                self.left["actuators that are no motor, position or velocity of a joint"] += 1
+                continue
+            name, measure = self._name("actuator", a), self._measure(j)
+            self.left["limits of controls and of forces of actuators"] += bool(
+                m.actuator_ctrllimited[a] or m.actuator_forcelimited[a]
+            )
+            b0, b1, b2 = map(float, m.actuator_biasprm[a][:3])
+            yield Motor(name, measure, torque=self._control(a, j, name, (b1, b2)))
+            if b0 or b1 or b2:
+                servo = self._added(f"{name}_servo")
+                yield Torsion(
+                    servo, measure, -(gear**2) * b1, 0.0, -(gear**2) * b2, preload=gear * b0
+                )
+
+    def _control(self, a: int, j: int, name: str, bias: tuple[float, float]) -> Any:
+        """The input NAME.control with its gain; it is what the servo follows, gear times."""
+        turns = self.m.jnt_type[j] == HINGE
+        effort, way = ("N.m", "rad") if turns else ("N", "m")
+        unit, per = "1", effort
+        if bias[0]:
+            unit, per = way, f"{effort}/{way}"
+        elif bias[1]:
+            unit, per = f"{way}/s", f"{effort}.s/{way}"
+        gain = sp.Symbol(f"{name}.gain", real=True)
+        value = float(self.m.actuator_gear[a][0] * self.m.actuator_gainprm[a][0])
+        self.parameters.append(Parameter(gain, value, per, f"gear times gain of {name}"))
+        control = dynamicsymbols(f"{name}.control")
+        start = (
+            float(self.m.key_ctrl[self.key][self.m.actuator_ctrladr[a]]) if self.key >= 0 else 0.0
+        )
+        self.inputs.append(Input(control, unit, start, f"control of {name}"))
+        return gain * control
+
+    # ------------------------------------------------------------------ start, and what is left out
+
+    def _start(self) -> dict[str, Any]:
+        """The coordinate of each joint of one motion, the place of each body behind another."""
+        m, mj, data = self.m, self.mj, self.mj.MjData(self.m)
+        data.qpos[:] = m.qpos0 if self.key < 0 else m.key_qpos[self.key]
+        if self.key >= 0:
+            data.qvel[:] = m.key_qvel[self.key]
+        mj.mj_forward(m, data)
+        found: dict[str, Any] = {}
+        for j in range(m.njnt):
+            b, q, d = int(m.jnt_bodyid[j]), int(m.jnt_qposadr[j]), int(m.jnt_dofadr[j])
+            if m.jnt_type[j] in (SLIDE, HINGE):
+                found[self._measure(j)] = float(data.qpos[q])
+                found[f"der({self._measure(j)})"] = float(data.qvel[d])
+                continue
+            body, R, rates = self.bodies[b], data.xmat[b].reshape(3, 3), np.zeros(6)
+            mj.mj_objectVelocity(m, data, mj.mjtObj.mjOBJ_XBODY, b, rates, 0)
+            found[f"{body.name}.orientation"] = tuple(data.xquat[b].tolist())
+            found[f"{body.name}.omega"] = tuple((R.T @ rates[:3]).tolist())
+            if m.jnt_type[j] == FREE:
+                arm = R @ np.array(body.center, dtype=float)
+                velocity = rates[3:] + np.cross(rates[:3], arm)
+                found[f"{body.name}.position"] = tuple((data.xpos[b] + arm).tolist())
+                found[f"{body.name}.velocity"] = tuple(velocity.tolist())
+        return found
+
+    def _tell(self) -> None:
+        m = self.m
+        self.left["geoms that can touch"] += int(((m.geom_contype | m.geom_conaffinity) != 0).sum())
+        self.left["tendons"] += m.ntendon
+        self.left["skins"] += m.nskin
+        self.left["flexes"] += m.nflex
+        self.left["sensors"] += m.nsensor
+        self.left["bodies that a mocap moves"] += m.nmocap
+        self.left["bodies whose gravity is compensated"] += int((m.body_gravcomp != 0).sum())
+        self.left["fluids"] += int(bool(m.opt.density or m.opt.viscosity))
+        self.left["meshes and other shapes of the picture"] += int((m.geom_type > BOX).sum())
+        told = [f"{count} {what}" for what, count in self.left.items() if count]
+        if told:
+            warnings.warn(
+                f"{self.called!r}: left out: {'; '.join(told)}; constraints are rigid, whatever solref and "
+                "solimp say",
+                LagfmuWarning,
+                stacklevel=4,
+            )
+
+
+def word(name: str) -> str:
+    """One word: what is no letter, digit or underscore becomes _, a leading digit gets one before it."""
+    found = re.sub(r"[^A-Za-z0-9_]", "_", name) or "_"
+    return f"_{found}" if found[0].isdigit() else found
+
+
+def _square(axes: Array) -> Array:
+    """The rotation next to a matrix that is one but for rounding."""
+    left, _, right = np.linalg.svd(axes)
+    return np.asarray(left @ right)

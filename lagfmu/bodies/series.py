@@ -1,0 +1,176 @@
+"""Several slides and hinges between two bodies, with nothing that has mass between them.
+
+In the axes of the first marker R = R_i(a) R_j(b) R_k(c), and with the axes i of the first marker and k of the
+second (u and w along the ground's axes, s = u . w, and e the sign of the permutation i, j, k)
+
+    w_rel = a' u + b' n + c' w ,     n = e w x u / |w x u| ,
+    a' = (u - s w) . w_rel / (1 - s^2) ,   b' = n . w_rel ,   c' = (w - s u) . w_rel / (1 - s^2) .
+
+Two hinges are square to each other, and the third direction is held.  A torque along what multiplies w_rel
+works on its angle alone.  At s^2 = 1 the first and the last axis are one: three angles do not tell the
+attitude there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+import numpy as np
+import sympy as sp
+
+from ..model.elements import Contact, Expr
+from ..model.reactions import multiplier
+from ..names import derivative
+from .body import Number
+from .draft import Draft, Relative, Wrench
+from .guess import Guess, Pose, Reach
+from .joints import CROSS, Joint
+from .motion import Placed, Timed, TimedVector, between, product
+from .rotation import turn
+from .vectors import AXES, Vector, cross, dot, minus, plus, times
+
+
+@dataclass(frozen=True, eq=False)
+class Series(Joint):
+    """The second marker slides along the axes `sliding` of the first, then turns about the axes `turning`,
+    each square to the others and carried on by those before it (in space).
+
+    `names` are those of these motions, in that order: angle.NAME, position.NAME; `stops` their limits.
+    """
+
+    sliding: str = ""
+    turning: str = ""
+    names: Sequence[str] = ()
+    stops: Mapping[str, Sequence[Number]] = field(default_factory=dict)
+
+    possible: ClassVar[tuple[str, str]] = ("", "xyz")
+
+    @property
+    def measures(self) -> list[str]:
+        """position.NAME and angle.NAME."""
+        kinds = ["position"] * len(self.sliding) + ["angle"] * len(self.turning)
+        return [f"{kind}.{name}" for kind, name in zip(kinds, self.names, strict=True)]
+
+    def relative_pose(self, guess: Guess) -> Reach:
+        """Where the given angles and positions put it, the others at 0."""
+        given = [guess.given.get(m, 0.0) for m in self.measures]
+        origin, axes = np.zeros(3), np.eye(3)
+        for x, value in zip(self.sliding, given, strict=False):
+            origin[AXES.index(x)] += value
+        for x, value in zip(self.turning, given[len(self.sliding) :], strict=True):
+            axes = axes @ turn(AXES.index(x), value)
+        reach = Reach((0, 0, 0), determined=True)
+        reach.pose = Pose(axes, origin)
+        return reach
+
+    def rows(self, draft: Draft, a: Placed, b: Placed, axis: int, wrench: Wrench) -> None:
+        """A row for each motion that it holds back."""
+        for k, x in enumerate(AXES):
+            if x not in self.sliding:
+                text = f"{self.name} does not move along {x} of its first marker"
+                draft.hold(f"{self.name}.{x}", product(a.axes[k], between(a, b)), text)
+                wrench.force[k] += multiplier(f"{self.name}.{x}")
+        if len(self.turning) == 2:
+            i, j = map(AXES.index, self.turning)
+            first, second = a.axes[i], b.axes[j]
+            row = f"{self.name}.{CROSS}"
+            draft.hold(row, product(first, second), f"the axes of {self.name} stay square")
+            torque = times(multiplier(row), cross(second.value, first.value))
+            for k, e in enumerate(a.axes):
+                wrench.torque[k] += dot(e.value, torque)
+        elif len(self.turning) < 2:
+            self._straight(draft, a, b, wrench)
+
+    def _straight(self, draft: Draft, a: Placed, b: Placed, wrench: Wrench) -> None:
+        """The rows of a hinge, or those of none."""
+        i = AXES.index(self.turning or "z")
+        j, k = (i + 1) % 3, (i + 2) % 3
+        along = dot(b.axes[i].value, a.axes[i].value)
+        self.hold(draft, wrench, k, product(b.axes[i], a.axes[j]), along)
+        self.hold(draft, wrench, j, Timed(*(-x for x in product(b.axes[i], a.axes[k]))))
+        if not self.turning:
+            along = dot(b.axes[j].value, a.axes[j].value)
+            self.hold(draft, wrench, i, product(b.axes[j], a.axes[k]), along)
+
+    def coordinate(self, draft: Draft, a: Placed, b: Placed, axis: int, wrench: Wrench) -> None:
+        """The motions that it leaves free, with their limits."""
+        slides = [
+            (AXES.index(x), product(a.axes[AXES.index(x)], between(a, b)), None)
+            for x in self.sliding
+        ]
+        found = slides + self._angles(a, b)
+        for name, (k, f, direction) in zip(self.measures, found, strict=True):
+            turns = name.startswith("angle")
+            f = draft.turning(name, f) if turns else f
+            values, unit = (f.value, f.rate, draft.second(f)), "rad" if turns else "m"
+            of = Relative(name, unit, values, a, b, k, direction, self.name)
+            draft.relative[name] = of
+            for order, expression in enumerate(values):
+                called = derivative(name, order)
+                if called not in draft.known:
+                    what = ("", "rate of ", "second derivative of ")[order] + name
+                    draft.report(called, expression, unit + ("", "/s", "/s^2")[order], what)
+            self._stop(draft, of)
+
+    def _stop(self, draft: Draft, of: Relative) -> None:
+        name = of.name.split(".")[1]
+        for which, sign, value in zip(
+            ("lower", "upper"), (1, -1), self.stops.get(name, ()), strict=False
+        ):
+            row = f"{name}.{which}"
+            stop = draft.number(value, row, of.unit, f"{which} limit of {of.name}")
+            text = f"{of.name} stops at its {which} limit"
+            draft.constraints.append(Contact(row, sign * (of.values[0] - stop), text, sp.S.Zero))
+            of.transmit(draft, sign * multiplier(row))
+
+    def _angles(self, a: Placed, b: Placed) -> list[tuple[int, Timed, Vector | None]]:
+        """The axis of each hinge, its angle within a turn with its rate, and along what a torque works."""
+        axes = [AXES.index(x) for x in self.turning]
+        if not axes:
+            return []
+        w = minus(b.motion.omega, a.motion.omega)
+        R = [[dot(x.value, y.value) for y in b.axes] for x in a.axes]
+        if len(axes) == 1:
+            i = axes[0]
+            j, k = (i + 1) % 3, (i + 2) % 3
+            e = a.axes[i]
+            rate = Timed(sp.atan2(R[k][j], R[j][j]), dot(e.value, w), dot(e.rate, w))
+            return [(i, rate, e.value)]
+        i, j = axes[:2]
+        k = 3 - i - j
+        sign = 1 if (j - i) % 3 == 1 else -1
+        u = a.axes[i]
+        if len(axes) == 2:
+            v = b.axes[j]
+            first = Timed(sp.atan2(sign * R[k][j], R[j][j]), dot(u.value, w), dot(u.rate, w))
+            second = Timed(sp.atan2(sign * R[i][k], R[i][i]), dot(v.value, w), dot(v.rate, w))
+            return [(i, first, u.value), (j, second, v.value)]
+        across = sp.sqrt(R[i][i] ** 2 + R[i][j] ** 2)
+        within = (
+            sp.atan2(-sign * R[j][k], R[k][k]),
+            sp.atan2(sign * R[i][k], across),
+            sp.atan2(-sign * R[i][j], R[i][i]),
+        )
+        directions = _dual(u, b.axes[k], sign)
+        return [
+            (axis, Timed(angle, dot(e, w), dot(rate, w)), e)
+            for axis, angle, (e, rate) in zip(axes, within, directions, strict=True)
+        ]
+
+
+def _dual(u: TimedVector, w: TimedVector, sign: int) -> list[tuple[Vector, Vector]]:
+    """What multiplies w_rel in the rates of three angles, and its derivative."""
+    s, ds, _ = product(u, w)
+    square = 1 - s**2
+    found = []
+    for x, y in ((u, w), (w, u)):
+        e = times(1 / square, minus(x.value, times(s, y.value)))
+        rate = minus(minus(x.rate, times(ds, y.value)), times(s, y.rate))
+        found.append((e, plus(times(1 / square, rate), times(2 * s * ds / square, e))))
+    size: Expr = sp.sqrt(square)
+    n = times(sign / size, cross(w.value, u.value))
+    turned = plus(cross(w.rate, u.value), cross(w.value, u.rate))
+    middle = (n, plus(times(sign / size, turned), times(s * ds / square, n)))
+    return [found[0], middle, found[1]]
