@@ -1,7 +1,6 @@
 """Build every model in models/ as an FMU of either target, where both can, and verify each through fmpy.
 
-One line an FMU, as soon as it is done: wall time of a simulated second in ms, and of all its closed
-forms the error that comes nearest to what is allowed.  All of them stand in OUT/verification.csv.
+One line an FMU, as soon as it is done.  All figures stand in OUT/verification.csv.
 Exit status 1 if a model cannot be built or misses a closed form.
 """
 
@@ -13,6 +12,7 @@ import multiprocessing
 import os
 import statistics
 import sys
+import textwrap
 import time
 import warnings
 from collections.abc import Iterator, Sequence
@@ -42,6 +42,8 @@ from lagfmu.prepare.prepare import Prepared, prepare
 
 MODELS = Path(__file__).parent / "models"
 RUNS = 3  # the time is the median of these
+COLUMNS = """ms/s: wall time of a simulated second in ms
+worst: the error that comes nearest to what is allowed, and of which statement"""
 HEADINGS = ["fmu", "target", "bytes", "build_s", "steps", "wall_ms_per_s"]
 HEADINGS += ["statement", "error", "allowed", "points", "verdict"]
 
@@ -142,7 +144,7 @@ def main(
     if fmi == 3:
         targets = (NATIVE,)
     elif missing:
-        console.print(f"{missing}; python FMUs only", soft_wrap=True)
+        _say(console, f"{missing}; python FMUs only")
     problems: list[str] = []
     work: list[tuple[Path, str]] = []
     for name in models or ():
@@ -158,6 +160,7 @@ def main(
     width = max((len(name) for _, name in work), default=0)
     if work and NATIVE in targets and takes_long(places):
         console.print("the C runtime is compiled first")
+    console.print(COLUMNS, style="dim", highlight=False)
     console.print(_line(width, "", "FMU", "target", "ms/s", "worst", "of"), style="bold")
     rows: list[tuple[str, ...]] = []
     total = 0
@@ -174,21 +177,21 @@ def main(
     if rows:
         file_of_all = out / "verification.csv"
         _write(file_of_all, rows)
-        console.print(f"every statement: {file_of_all}", highlight=False, soft_wrap=True)
+        _say(console, f"every statement: {file_of_all}")
     for problem in problems:
-        console.print(Text(f"FAIL {problem}", style="bold red"), soft_wrap=True)
+        _say(console, f"FAIL {problem}", "bold red")
     if problems or not total:
         sys.exit(1)
     count = f"all {total} FMUs in {out} hold" if total > 1 else f"the FMU in {out} holds"
     closed = "their closed forms" if total > 1 else "its closed forms"
-    console.print(Text(f"{count} {closed}", style="green"), soft_wrap=True)
+    _say(console, f"{count} {closed}", "green")
 
 
 def _report(console: Console, width: int, made: Made) -> list[str]:
     """Prints the line of one FMU and its notes; returns what is wrong with it."""
     if made.refused:
         line = _line(width, "", made.scene, made.target)
-        console.print(Text(f"{line}  refused: {made.refused}"), soft_wrap=True)
+        _say(console, f"{line}  refused: the python target has {made.refused}")
         return []
     name, found = f"{made.target}/{made.scene}", made.found
     problems = [f"{name}: {made.error}"] if found is None else []
@@ -203,10 +206,25 @@ def _report(console: Console, width: int, made: Made) -> list[str]:
             cells += [f"{found.worst.error:.1e}", found.worst.name]
         if found.passed:
             verdict, style = "pass", ""
-    console.print(Text(_line(width, verdict, *cells), style=style), soft_wrap=True)
+    _say(console, _line(width, verdict, *cells), style)
     for note in notes:
-        console.print(Text(f"note: {note}"), soft_wrap=True)
+        _say(console, f"note: {note}")
     return problems
+
+
+def _say(console: Console, text: str, style: str = "") -> None:
+    """Words on lines as wide as the console; the further ones are indented."""
+    lines = textwrap.wrap(
+        text,
+        console.width,
+        subsequent_indent="      ",
+        replace_whitespace=False,
+        drop_whitespace=True,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+    for line in lines:
+        console.print(Text(line, style=style), soft_wrap=True)
 
 
 def _rows(made: Made) -> list[tuple[str, ...]]:
@@ -226,7 +244,7 @@ def _cost(made: Made, found: Verification) -> str:
 def _line(
     width: int, verdict: str, name: str, target: str, spent: str = "", error: str = "", of: str = ""
 ) -> str:
-    """One FMU on one line: nothing is cut, however narrow the console."""
+    """One FMU; nothing is cut, however narrow the console."""
     return f"{verdict:4}  {name:{width}}  {target:6}  {spent:>5}  {error:>7}  {of}".rstrip()
 
 

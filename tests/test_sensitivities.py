@@ -522,7 +522,7 @@ def test_methods_whose_steps_are_not_differentiated():
 
 def test_the_python_target_refuses_them(built):
     """It takes no derivatives of a run, and says so when it is built."""
-    with pytest.raises(BuildError, match="it takes no derivatives of a run"):
+    with pytest.raises(BuildError, match="it has no derivatives of a run"):
         built(
             model_file("hemisphere").model,
             Scene("Hemisphere", sensitivities=("r:a",)),

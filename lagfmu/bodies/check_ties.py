@@ -35,6 +35,15 @@ def problems_of_ties(parts: Sequence[Any], planar: bool) -> Iterator[str]:
             yield from _of_curve(part, planar)
         yield from _of_numbers(part)
         yield from _of_references(part, parts)
+    motors: dict[Any, Motor] = {}
+    for part in parts:
+        if isinstance(part, Motor) and isinstance(name := name_of_joint(part.joint), str):
+            other = motors.setdefault(name.split(".")[-1], part)
+            if other is not part and (part.motion is not None or other.motion is not None):
+                yield (
+                    f"Motors {other.name!r} and {part.name!r} both drive the joint {name!r}, of which one "
+                    "prescribes the motion: leave one out"
+                )
 
 
 def _of_joint(joint: Joint, planar: bool) -> Iterator[str]:

@@ -23,6 +23,7 @@ from .plane import PlaneMotion
 from .readings import readings_of
 from .space import SpaceMotion
 from .told import lines_of
+from .unusual import coinciding, warn_of_radii
 from .vectors import AXES
 
 
@@ -98,7 +99,11 @@ def mechanism(
         laws=laws_of(draft, parts),
         **{"picture": picture_of(draft, parts), **more},
     )
-    return model.started(*assemble(draft, model, parts, start or {}))
+    started = model.started(*assemble(draft, model, parts, start or {}))
+    if problems := coinciding(draft, started, parts):
+        raise ModelError(str(name), problems)
+    warn_of_radii(draft, parts)
+    return started
 
 
 def _wound(parts: Sequence[Any], start: Mapping[str, Any]) -> set[str]:

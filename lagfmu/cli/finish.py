@@ -38,12 +38,16 @@ def print_verdicts(found: Verification) -> None:
         colour = {"pass": "green", "FAIL": "bold red"}.get(check.verdict, "yellow")
         table.add_row(escape(row[0]), *row[1:4], f"[{colour}]{row[4]}[/]")
     print_whole(console, table)
-    if len(found.checks) <= OF_THE_FILE:
-        console.print("[yellow]the FMU carries no closed forms: its physics was not checked[/]")
+    if all(c.name in OF_THE_FILE for c in found.checks):
+        say(
+            f"{found.name}: the FMU carries no closed forms: its physics was not checked",
+            "note:",
+            "yellow",
+        )
     if found.left_out:
         of = f"{found.left_out} of {found.left_out + found.closed_forms} closed forms"
-        told = f"{of} were not checked: this FMU leaves out what they need"
+        told = f"{found.name}: {of} were not checked: this FMU leaves out what they need"
         say(told, "note:", "yellow")
     for check in found.checks:
         if check.failed and check.detail:
-            say(check.detail, f"{escape(check.name)}:", "red", errors)
+            say(check.detail, f"{escape(found.name)}: {escape(check.name)}:", "red", errors)

@@ -118,17 +118,18 @@ def _of_pythonfmu(name: str) -> dict[str, bytes]:
 def refusals(prepared: Prepared) -> list[str]:
     """What the scene asks for that native FMUs alone do, each by name; empty: this target can be built."""
     scene, system = prepared.scene, prepared.system
-    found = [f"it does not slip (friction {law.name!r})" for law in system.frictions]
+    rubs = ", ".join(repr(law.name) for law in system.frictions)
+    found = [f"no friction ({rubs})"] if rubs else []
     if system.surfaces is not None:
-        found.append("its forces do not jump")
+        found.append("no forces that jump")
     if scene.error_bars:
-        found.append("it has no error bars")
+        found.append("no error bars")
     if scene.sensitivities:
-        found.append("it takes no derivatives of a run")
+        found.append("no derivatives of a run")
     peaks = dict.fromkeys(v.of.coordinate for v in prepared.table.those(*names.PEAKS))
-    found += [f"it tells no extremes (peak.{name})" for name in peaks]
+    found += [f"no extremes (peak.{name})" for name in peaks]
     if scene.method not in IN_PYTHON:
-        found.append(f"its methods are {', '.join(IN_PYTHON)} (not {scene.method!r})")
+        found.append(f"the methods {', '.join(IN_PYTHON)} (not {scene.method!r})")
     return found
 
 
@@ -137,7 +138,7 @@ def offered(prepared: Prepared) -> VariableTable:
     if reasons := refusals(prepared):
         missing = missing_for_native()
         raise BuildError(
-            f"the python target cannot run scene {prepared.scene.name!r}: {'; '.join(reasons)}; build "
+            f"the python target cannot run scene {prepared.scene.name!r}: it has {'; '.join(reasons)}; build "
             f"--target native{f' ({missing})' * bool(missing)}"
         )
     table = prepared.table.without(names.STEP)  # no method of this target has a fixed step

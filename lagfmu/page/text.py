@@ -44,9 +44,15 @@ def show_besides(prepared: Prepared, console: Console, untried: str = "") -> Non
         _classes(prepared.equations, console)
 
     _heading(console, "Degrees of freedom")
-    count = f"  N = n - rank G = {structure.n} - {structure.rank} = {structure.degrees_of_freedom}"
-    if any(isinstance(c, Contact) for c in prepared.equations.constraints):
-        count += ", with every contact closed"
+    contacts = sum(isinstance(c, Contact) for c in prepared.equations.constraints)
+    closed, opened = structure.rank, structure.open_rank
+    together = contacts <= closed - opened  # two stops of a joint are not closed at once
+    rank = closed if together else opened
+    count = f"  N = n - rank G = {structure.n} - {rank} = {structure.n - rank}"
+    if contacts and together:
+        count += f", with every contact closed; {structure.n - opened} with every contact open"
+    elif contacts:
+        count += ", with every contact open"
     console.print(Text(count))
     if structure.redundant:
         names, shared = ", ".join(structure.redundant), ", ".join(structure.shared)

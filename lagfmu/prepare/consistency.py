@@ -88,6 +88,18 @@ def examined_structure(value: Lowered) -> Structure:
         raise CannotStartError(error.name, problems, value) from error
 
 
+def _open_rank(system: System, G: Sparse, closed: int) -> int:
+    """The rank of the rows that act while every contact is open; `closed`: of all."""
+    held = [k for k in system.permanent if system.rows[k].friction is None]
+    if not system.contacts or not held:
+        return closed if held else 0
+    rows = G.toarray()[held]
+    size = np.linalg.norm(rows, axis=1, keepdims=True)
+    return int(
+        np.linalg.matrix_rank(rows / np.where(size > 0, size, 1.0), tol=float(np.sqrt(RANK)))
+    )
+
+
 def structure_of(posed: Posed) -> Structure:
     """Check that the model can start, and count its degrees of freedom.
 
@@ -98,7 +110,7 @@ def structure_of(posed: Posed) -> Structure:
     eom, system, (u, p) = posed.equations, posed.system, posed.values
     begun = begin(posed)
     generator = random.Random(1)
-    ranks, masses = [], []
+    ranks, masses, opened = [], [], []
     for trial in range(TRIALS):
         q, v = begun.q, begun.v
         if trial:  # a nearby configuration that satisfies the constraints as well
@@ -118,6 +130,7 @@ def structure_of(posed: Posed) -> Structure:
             continue
         ranks.append(rank_of(full, G, f, np.abs(G) @ full.across(np.abs(q), begun.span), law))
         masses.append(M)
+        opened.append(_open_rank(full, G, ranks[-1].rank))
     size = np.abs([M.diagonal() for M in masses]).max(axis=0)
     negative = negative_energy(full, masses[0], size)
     if negative:
@@ -143,7 +156,9 @@ def structure_of(posed: Posed) -> Structure:
             stacklevel=5,
         )
     missed = _missed(posed, begun)
-    return Structure(eom.nv, eom.m, found.rank, redundant, shared, undecided, begun, missed)
+    return Structure(
+        eom.nv, eom.m, found.rank, redundant, shared, undecided, begun, missed, max(opened)
+    )
 
 
 def remedy_of(eom: EquationsOfMotion) -> str:

@@ -19,8 +19,8 @@ from ..numeric.system import System
 @dataclass(frozen=True)
 class Structure:
     """n, m, rank of G with all constraints acting, degrees of freedom, redundant constraints, all whose
-    multipliers are not unique, frictions whose normal forces are not, start, and the constraints that the
-    given start values miss, in words."""
+    multipliers are not unique, frictions whose normal forces are not, start, the constraints that the given
+    start values miss, in words, and the rank with no contact closed."""
 
     n: int
     m: int
@@ -30,6 +30,7 @@ class Structure:
     undecided: tuple[str, ...]
     start: Start
     missed: tuple[str, ...]
+    open_rank: int
 
     @property
     def degrees_of_freedom(self) -> int:

@@ -20,6 +20,10 @@ from ..fmu.read import Trajectory
 from .check import Check, Missed
 
 Driven = Trajectory | str | os.PathLike[str]  # inputs over time: a table, or a CSV file
+REMEDY = (
+    "expected commas between columns and points in numbers, 0.5: save it so, or in pandas "
+    "read_csv(FILE, sep=';', decimal=',').to_csv(FILE, index=False)"
+)
 TRUTH = {"True": 1.0, "False": 0.0, "true": 1.0, "false": 0.0}
 
 
@@ -103,6 +107,10 @@ def read_table(path: Path, gaps: bool = False) -> Trajectory:
             f"{str(path)!r} is no table: expected names, and rows of numbers"
         ) from None
     names = [n.strip() for n in head]
+    if len(names) == 1 and ";" in names[0]:
+        raise SettingError(f"{str(path)!r} separates its columns by semicolons: {REMEDY}")
+    if rows and all(len(row) == 2 * len(names) for row in rows):
+        raise SettingError(f"{str(path)!r} has decimal commas: {REMEDY}")
     if twice := sorted({n for n in names if names.count(n) > 1}):
         raise SettingError(f"{str(path)!r}: {', '.join(twice)} stands in two columns")
     table = np.zeros(len(rows), dtype=[(n, float) for n in names])
@@ -119,6 +127,7 @@ def read_table(path: Path, gaps: bool = False) -> Trajectory:
         except ValueError:
             raise SettingError(
                 f"{str(path)!r} is no table of numbers: row {k + 1} is {','.join(row)!r}"
+                + (f": {REMEDY}" if len(row) > len(names) else "")
             ) from None
     if bad:
         more = f", and {len(bad) - 5} more" if len(bad) > 5 else ""

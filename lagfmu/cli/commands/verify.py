@@ -35,6 +35,10 @@ def verify(
         float, typer.Option(help="Allowed absolute error, in the column's unit.")
     ] = 0.0,
     statements: options.StatementsFile = None,
+    validation: Annotated[
+        bool,
+        typer.Option(help="Hold the file against fmpy's own check, which refuses some tools'."),
+    ] = True,
     html: Annotated[
         Path | None,
         typer.Option(help="Write a page with what was found, and pictures of what fails."),
@@ -70,7 +74,15 @@ def verify(
         for fmu in fmus:  # one that cannot be run does not keep the others from it
             try:
                 found = held(
-                    fmu, values, stop_time, step_size, tolerance, signals, table, statements
+                    fmu,
+                    values,
+                    stop_time,
+                    step_size,
+                    tolerance,
+                    signals,
+                    table,
+                    statements,
+                    validation=validation,
                 )
             except LagfmuError as error:
                 done.append(refused(str(fmu), error))

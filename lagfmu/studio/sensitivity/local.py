@@ -9,7 +9,7 @@ from __future__ import annotations
 import contextlib
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -45,6 +45,15 @@ from ...verification.reference import Driven, driven
 Floats = NDArray[np.float64]
 TOLERANCE = 1e-11  # of the runs: their noise limits the differences
 ALL = "all"
+MATTERS = (
+    1e-3  # of the largest relative derivative: what is below is not shown where all were asked for
+)
+LONGEST = 40  # characters of a remark inside a table
+
+
+def _short(text: str, notes: Sequence[str]) -> str:
+    """A remark, or the number of the note that it is."""
+    return f"({list(notes).index(text) + 1})" if text in notes else text
 
 
 @dataclass(frozen=True)
@@ -52,7 +61,8 @@ class Sensitivity:
     """Derivatives (outputs, parameters) at the end of a run, in the units [output]/[parameter], NaN where
     there is none; `why`: of each of these the reason; `own`: of each whether the FMU gave it; `values` and
     `points`: of outputs and parameters, by name; `step`: of differences, relative; `ended`: the FMU tells
-    derivatives, and they ended within the run."""
+    derivatives, and they ended within the run; `everything`: all parameters were asked for, of which `tables`
+    show those that matter."""
 
     name: str
     stop_time: float
@@ -64,6 +74,7 @@ class Sensitivity:
     units: Mapping[str, str]
     step: float
     ended: bool = False
+    everything: bool = False
 
     @property
     def relative(self) -> Floats:
@@ -128,7 +139,8 @@ class Sensitivity:
             title = f"{output} = {value:.9g} {unit} at t = {self.stop_time:g} s"
             head = ("parameter", "% per %", "derivative", "unit", "remark")
             drawn = new_table(escape(title), *head, words=["parameter", "unit"], text=["remark"])
-            for k in self.order(i):
+            shown, notes = self._shown(i), self._notes()
+            for k in shown:
                 name = list(self.points)[k]
                 part, slope = self.relative[i, k], self.derivatives[i, k]
                 drawn.add_row(
@@ -136,13 +148,48 @@ class Sensitivity:
                     "" if np.isnan(part) else f"{part:+.6f}",
                     "" if np.isnan(slope) else f"{slope:.9g}",
                     f"{unit or '1'} / {for_reading(self.units.get(name)) or '1'}",
-                    self.why.get((output, name), ""),
+                    _short(self.why.get((output, name), ""), notes),
                 )
             found.append(drawn)
         return found
 
+    def _shown(self, output: int) -> list[int]:
+        """Of a table the parameters that matter, the first of them first; all that were asked for by name."""
+        order = self.order(output)
+        if not self.everything:
+            return order
+        part, slopes = np.abs(self.relative[output]), self.derivatives[output]
+        least = MATTERS * float(np.nanmax(part, initial=0.0))
+        size = abs(list(self.values.values())[output])
+        apart = np.isnan(part) & (
+            np.abs(np.nan_to_num(slopes)) > MATTERS * size
+        )  # of 0 no part can be told
+        return [k for k in order if (part[k] >= least and part[k] > 0) or apart[k]] or order[:1]
+
+    def _notes(self) -> list[str]:
+        """Reasons that are too long for a table."""
+        shown = {
+            (o, list(self.points)[k]) for i, o in enumerate(self.values) for k in self._shown(i)
+        }
+        told = dict.fromkeys(text for pair, text in self.why.items() if pair in shown)
+        return [text for text in told if len(text) > LONGEST]
+
     def remarks(self) -> list[str]:
-        """Which derivatives are differences of runs."""
+        """Reasons that are too long for a table, and which derivatives are differences of runs."""
+        notes = [f"({k}) {text}" for k, text in enumerate(self._notes(), 1)]
+        for i, output in enumerate(self.values):
+            hidden = set(range(len(self.points))) - set(self._shown(i))
+            untold: dict[str, list[str]] = {}
+            for k, name in enumerate(self.points):
+                if k in hidden and (output, name) in self.why:
+                    untold.setdefault(self.why[output, name], []).append(name)
+            notes += [f"no derivative by {', '.join(by)}: {why}" for why, by in untold.items()]
+            if rest := len(hidden) - sum(map(len, untold.values())):
+                text = f"{output}: {rest} more matter less than {MATTERS:g} of the first"
+                notes.append(f"{text}: --to NAME shows them")
+        return notes + self._differences()
+
+    def _differences(self) -> list[str]:
         if self.own.all():
             return []
         these = "derivatives" if not self.own.any() else f"{int((~self.own).sum())} derivatives"
@@ -185,7 +232,8 @@ def sensitivity(
         points = communication_points(experiment.stop_time, experiment.step_size)
         runs = _Runs(session, np.union1d(points, jumps(inputs, points)), tolerance, inputs, of)
         start = {p: float(given.get(p, rules[p].start or 0.0)) for p in asked}
-        return _found(description, runs, of, start, given, rules)
+        found = _found(description, runs, of, start, given, rules)
+        return replace(found, everything=to in (ALL, [ALL], (ALL,)))
 
 
 @contextlib.contextmanager
