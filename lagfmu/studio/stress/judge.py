@@ -8,7 +8,7 @@
                velocities: the largest of the unit
   push         lambda >= 0 while a contact is closed, within 10 tol of the largest |lambda|
   no pull      lambda = 0, exactly, while it is open: f lambda = 0
-  outside      f >= 0 while it is open, within 1e-9 of f's own size, more than in which it touches
+  outside      f >= 0 while it is open, within 1e-9 of f's own size
   closed_forms       the closed forms and conserved quantities (closed_forms.py)
 
 Each comes as an error and what is allowed; the run is right if no error exceeds what it is allowed.
