@@ -93,6 +93,7 @@ static const double
 /* clang-format on */
 
 static const double SAFETY = 0.9, LEAST_FACTOR = 1.0 / 3, LARGEST_FACTOR = 6, RETREAT = 0.1;
+static const double DEFECT_AT = 0.935, DEFECT_SHARE = 0.2; /* of the dense output: dop853_dense_error() */
 
 enum { DENSE_STAGES = 7 }; /* stages 6 to 12, which the dense output needs */
 
@@ -282,6 +283,35 @@ static void dop853_dense(const Integrator *i, double t, double *y) {
     }
 }
 
+/* d/ds of s^a z^b, z = 1 - s. */
+static double slope_of(double s, int a, int b) {
+    double power = a * (1 - s) - b * s;
+    for (int k = 1; k < a; k++) power *= s;
+    for (int k = 1; k < b; k++) power *= 1 - s;
+    return power;
+}
+
+/* The dense output p is of one order less than the step.  Its largest error within the step is 0.12 to 0.2 of
+ * |h (p' - f(p))| at 0.935 of the step, where that is largest (measured: pendulum, cycloid, Kepler, exp, cos, t^8). */
+static Status dop853_dense_error(Integrator *i, const Ode *ode, const Control *control, double *error) {
+    const int n = i->ny;
+    const double s = DEFECT_AT, z = 1 - s, h = i->t - i->t_old, tolerance = step_size_tolerance(control);
+    const double *r1 = i->dense, *r2 = r1 + n, *r3 = r2 + n, *r4 = r3 + n, *r5 = r4 + n, *r6 = r5 + n, *r7 = r6 + n;
+    const double p3 = slope_of(s, 2, 1), p4 = slope_of(s, 2, 2), p5 = slope_of(s, 3, 2);
+    const double p6 = slope_of(s, 3, 3), p7 = slope_of(s, 4, 3);
+    double *y = i->scratch, *f = y + n, square = 0;
+    dop853_dense(i, i->t_old + s * h, y);
+    if (ode->rate(ode->context, i->t_old + s * h, y, f) != OK) return FAILED;
+    for (int j = 0; j < i->watched; j++) {
+        const double slope = 2 * s * r1[j] + (z - s) * r2[j] + p3 * r3[j] + p4 * r4[j] +
+                             p5 * r5[j] + p6 * r6[j] + p7 * r7[j];
+        const double off = (slope - h * f[j]) / step_size_weight(tolerance, i->y_old[j], i->y[j], control->scale[j]);
+        square += off * off;
+    }
+    *error = DEFECT_SHARE * sqrt(square / i->watched);
+    return OK;
+}
+
 SHARED_VALUE const Method dop853 = {
     .name = "dop853",
     .dense_arrays = DENSE_STAGES + 2,
@@ -290,4 +320,5 @@ SHARED_VALUE const Method dop853 = {
     .step = dop853_step,
     .prepare_dense = dop853_prepare,
     .dense = dop853_dense,
+    .dense_error = dop853_dense_error,
 };

@@ -67,6 +67,8 @@ struct Method {
      * nothing to do. */
     Status (*prepare_dense)(Integrator *i, const Ode *ode);
     void (*dense)(const Integrator *i, double t, double *y);
+    /* The largest error of dense() within the step, in units of the tolerance; after prepare_dense.  NULL: not known. */
+    Status (*dense_error)(Integrator *i, const Ode *ode, const Control *control, double *error);
 };
 
 enum { RADAU5_MOST_STATES = 800 }; /* for which radau5 keeps dense matrices */

@@ -81,7 +81,6 @@ static Status slide_on(Solver *s, const double *y1) {
     Numbers *now = &s->state.now;
     const Integrator *i = &s->integrator;
     double lost;
-    now->lost_old = now->lost_ahead;
     if (now->event_count > 0) return OK; /* the work is done as far as the event: meet() */
     if (OPTIONAL.friction->work(s, i->t_old, i->t, &lost) != OK) return FAILED;
     now->lost_ahead += lost;
@@ -113,12 +112,14 @@ static Status step_towards(Solver *s, double t_end, double bound, double longest
     Integrator *i = &s->integrator;
     const int watch = indicators_count(s->system) > 0;
     double *y1 = s->work_advance;
+    s->state.now.lost_old = s->state.now.lost_ahead;
     if (step_clear(s, bound, longest) != OK) return FAILED;
     if (!(s->taken > 0)) s->first = i->t - i->t_old;
     s->taken = fmax(s->taken, i->t - i->t_old);
     s->state.now.estimated = fmax(s->state.now.estimated, i->error * segment_tolerance(s));
     const int near = OPTIONAL.passage != NULL && OPTIONAL.passage->suspected(s);
     if ((watch || near || features_everywhere(s) || i->t > t_end) && segment_prepare_dense(s, i) != OK) return FAILED;
+    if (i->t > t_end) s->state.now.rough = segment_dense_rough(s, i);
     memcpy(y1, i->y, (size_t)i->ny * sizeof *y1);
     if (segment_project(s, i->t, y1) != OK) return FAILED;
     if (segment_check_projection(s, i->t, i->y, y1) != OK) return FAILED;
@@ -182,7 +183,7 @@ static void put(Solver *s, double t, const double *y) {
 static Status put_between(Solver *s, double t) {
     const Integrator *i = &s->integrator;
     double *y = s->work_advance;
-    if (i->method->coarse) {
+    if (i->method->coarse || s->state.now.rough) {
         if (segment_reach(s, i->t_old, i->y_old, t, y) != OK) return FAILED;
     } else {
         i->method->dense(i, t, y);

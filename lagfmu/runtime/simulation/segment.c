@@ -197,6 +197,15 @@ Status segment_prepare_dense(Solver *s, Integrator *i) {
     return i->method->prepare_dense == NULL ? OK : i->method->prepare_dense(i, &ode);
 }
 
+int segment_dense_rough(Solver *s, Integrator *i) {
+    const Ode ode = equations_at(s, i->t);
+    Control c = control(s, i, HUGE_VAL);
+    double error;
+    c.tolerance = segment_tolerance(s); /* these errors do not add up */
+    if (i->method->dense_error == NULL) return 0;
+    return i->method->dense_error(i, &ode, &c, &error) != OK || !(error <= 1);
+}
+
 Status segment_project(Solver *s, double t, double *y) {
     const Instant at = segment_instant(s, t);
     if (mechanism_project(&s->stepped, at, y, y + s->system->nq, s->active, s->state.offset, s->state.span) != OK)

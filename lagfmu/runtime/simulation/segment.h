@@ -46,6 +46,9 @@ SHARED Status segment_rate(Solver *s, Integrator *i);
 /* Completes the dense output of the step just taken. */
 SHARED Status segment_prepare_dense(Solver *s, Integrator *i);
 
+/* After it: may dense() be off by more than the tolerance? */
+SHARED int segment_dense_rough(Solver *s, Integrator *i);
+
 /* y (solver_width()) moved onto the constraints. */
 SHARED Status segment_project(Solver *s, double t, double *y);
 

@@ -79,6 +79,7 @@ typedef struct {
     N(double, h_next, LIMIT, "next step")                                                                            \
     N(double, error_old, LIMIT, "error of the step")                                                                 \
     N(int, fresh, FLAG, "mode of the step ahead")             /* ... as far as here */                               \
+    N(int, rough, FLAG, "mode of the step ahead")             /* ... within it states are integrated, not interpolated */ \
     N(double, lost, FINITE, "energy dissipated")              /* [J] by frictions and impacts, ... */                \
     N(double, lost_old, FINITE, "energy dissipated")          /* ... so far where the integrator began its step, ... */ \
     N(double, lost_ahead, FINITE, "energy dissipated")        /* ... and stands */                                   \
