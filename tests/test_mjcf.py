@@ -92,6 +92,12 @@ JOINTS = {
         "0.4 0.9",
         "1.1 -2",
     ),
+    "two hinges apart": (
+        '<joint name="j" axis="1 0 0" armature="0.1" pos="0.1 0.2 0.3"/>'
+        '<joint name="k" axis="0 1 1" stiffness="2" damping="1"/>',
+        "0.4 0.9",
+        "1.1 -2",
+    ),
     "three hinges": (
         '<joint name="j" axis="1 0 0" damping="1"/><joint name="k" axis="0 1 0" armature="0.2" damping="2"/>'
         '<joint name="l" axis="0 0 1" stiffness="5"/>',
@@ -253,7 +259,7 @@ def test_a_joint_stops_at_its_range_and_swings_between_its_limits(tmp_path: Path
 
 def test_what_several_hinges_transmit_moves_both_bodies(tmp_path: Path) -> None:
     """A build holds m a and the rate of angular momentum of each body against all that acts on it."""
-    joints = '<joint name="j" axis="1 0 0" armature="0.1"/>'
+    joints = '<joint name="j" axis="1 0 0" armature="0.1" pos="0.1 0.2 0.3"/>'
     joints += '<joint name="k" axis="0 1 0" damping="1" stiffness="2"/>'
     more = '<actuator><motor name="drive" joint="k"/></actuator><keyframe>'
     more += '<key name="home" qpos="0.4 0.9" qvel="1 -2" ctrl="3"/></keyframe>'
@@ -341,7 +347,7 @@ WRONG: dict[str, tuple[str, str]] = {
         "expected one of degree 1: write polycoef",
     ),
     "points apart": (
-        good("<geom", '<joint axis="1 0 0" pos="0 0.1 0"/><geom'),
+        good("<geom", '<joint axis="1 0 0" pos="0 0.1 0"/><joint axis="0 1 0"/><geom'),
         "their points are 0.1 m apart: give each a body of its own with a mass",
     ),
     "axes askew": (

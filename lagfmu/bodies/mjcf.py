@@ -278,7 +278,7 @@ class _Reader:
         remedy = "give each a body of its own with a mass"
         if own != slides + hinges:
             self.problems.append(f"{what}: expected slides first, then hinges: {remedy}")
-        elif apart > SQUARE * max(1.0, float(np.abs(points).max())):
+        elif len(hinges) != 2 and apart > SQUARE * max(1.0, float(np.abs(points).max())):
             self.problems.append(f"{what}: their points are {apart:.6g} m apart: {remedy}")
         elif axes is None:
             self.problems.append(f"{what}: their axes are not square to each other: {remedy}")
@@ -287,18 +287,37 @@ class _Reader:
         else:
             letters, frame = axes
             along, about = (letters[: len(slides)], letters[len(slides) :])
-            first, turned = points[0].copy(), frame
+            first, second, arm = self._met(hinges, points)
+            turned = frame
             for j, ref in zip(own, refs, strict=True):
                 first -= ref * x[j] if j in slides else 0.0
                 turned = turned @ turn(AXES.index(about), ref) if j in hinges and ref else turned
-            ends = self._marker(parent, frame, first), self._marker(b, turned, points[0])
+            ends = self._marker(parent, frame, first), self._marker(b, turned, second)
             names = [self.joint_names[j] for j in own]
             stops = {self.joint_names[j]: s for j in own if (s := self._limits(j)) is not None}
             name = self.bodies[b].name + "_joints"
             while name in self.taken:
                 name += "_"
             self.taken.add(name)
-            yield Series(name, *ends, sliding=along, turning=about, names=names, stops=stops)
+            yield Series(
+                name, *ends, sliding=along, turning=about, names=names, stops=stops, apart=arm
+            )
+
+    def _met(self, hinges: list[int], points: Array) -> tuple[Array, Array, float]:
+        """A point of the first hinge's axis and one of the last's, that are next to each other of two, and
+        how far the second is along the cross product of the axes."""
+        first, second = points[0].copy(), points[-1].copy()
+        if len(hinges) != 2:
+            return first, second, 0.0
+        u, v = (self.data.xaxis[j] for j in hinges)
+        between = second - first
+        arm = float(between @ np.cross(u, v))
+        size = SQUARE * max(1.0, float(np.abs(points).max()))
+        return (
+            first + (between @ u) * u,
+            second - (between @ v) * v,
+            arm if abs(arm) > size else 0.0,
+        )
 
     def _letters(self, slides: list[int], hinges: list[int]) -> tuple[str, Array] | None:
         """The letter of each axis in a right-handed frame that has them all; none if none has."""

@@ -26,10 +26,10 @@ from ..names import derivative
 from .body import Number
 from .draft import Draft, Relative, Wrench
 from .guess import Guess, Pose, Reach
-from .joints import CROSS, Joint
+from .joints import CROSS, Joint, model_number
 from .motion import Placed, Timed, TimedVector, between, product
 from .rotation import turn
-from .vectors import AXES, Vector, cross, dot, minus, plus, times
+from .vectors import AXES, ZERO, Vector, cross, dot, minus, plus, times
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,13 +37,16 @@ class Series(Joint):
     """The second marker slides along the axes `sliding` of the first, then turns about the axes `turning`,
     each square to the others and carried on by those before it (in space).
 
-    `names` are those of these motions, in that order: angle.NAME, position.NAME; `stops` their limits.
+    `names` are those of these motions, in that order: angle.NAME, position.NAME; `stops` their limits.  The
+    second of two hinges may be `apart` from the first, along the cross product n of their axes [m].
     """
 
     sliding: str = ""
     turning: str = ""
     names: Sequence[str] = ()
     stops: Mapping[str, Sequence[Number]] = field(default_factory=dict)
+
+    apart: Number = 0.0
 
     possible: ClassVar[tuple[str, str]] = ("", "xyz")
 
@@ -61,16 +64,21 @@ class Series(Joint):
             origin[AXES.index(x)] += value
         for x, value in zip(self.turning, given[len(self.sliding) :], strict=True):
             axes = axes @ turn(AXES.index(x), value)
+            if x == self.turning[0] and len(self.turning) == 2:
+                i, j = map(AXES.index, self.turning)
+                arm = model_number(guess.model, self.apart)
+                origin += arm * axes @ np.cross(np.eye(3)[i], np.eye(3)[j])
         reach = Reach((0, 0, 0), determined=True)
         reach.pose = Pose(axes, origin)
         return reach
 
     def rows(self, draft: Draft, a: Placed, b: Placed, axis: int, wrench: Wrench) -> None:
         """A row for each motion that it holds back."""
+        away = self._away(draft, a, b)
         for k, x in enumerate(AXES):
             if x not in self.sliding:
                 text = f"{self.name} does not move along {x} of its first marker"
-                draft.hold(f"{self.name}.{x}", product(a.axes[k], between(a, b)), text)
+                draft.hold(f"{self.name}.{x}", product(a.axes[k], away), text)
                 wrench.force[k] += multiplier(f"{self.name}.{x}")
         if len(self.turning) == 2:
             i, j = map(AXES.index, self.turning)
@@ -78,10 +86,38 @@ class Series(Joint):
             row = f"{self.name}.{CROSS}"
             draft.hold(row, product(first, second), f"the axes of {self.name} stay square")
             torque = times(multiplier(row), cross(second.value, first.value))
+            torque = plus(torque, self._moment(draft, a, b, wrench))
             for k, e in enumerate(a.axes):
                 wrench.torque[k] += dot(e.value, torque)
         elif len(self.turning) < 2:
             self._straight(draft, a, b, wrench)
+
+    def _arm(self, draft: Draft) -> Expr:
+        text = f"distance of the hinges of {self.name}"
+        return draft.number(self.apart, f"{self.name}.apart", "m", text)
+
+    def _away(self, draft: Draft, a: Placed, b: Placed) -> TimedVector:
+        """From the first marker to the second, less what lies between two hinges."""
+        d = between(a, b)
+        if len(self.turning) != 2 or self._arm(draft) == 0:
+            return d
+        u, v = a.axes[AXES.index(self.turning[0])], b.axes[AXES.index(self.turning[1])]
+        rate = plus(cross(u.rate, v.value), cross(u.value, v.rate))
+        ends = plus(cross(u.bend, v.value), cross(u.value, v.bend))
+        n = cross(u.value, v.value), rate, plus(ends, times(2, cross(u.rate, v.rate)))
+        arm = self._arm(draft)
+        return TimedVector(*(minus(x, times(arm, y)) for x, y in zip(d, n, strict=True)))
+
+    def _moment(self, draft: Draft, a: Placed, b: Placed, wrench: Wrench) -> Vector:
+        """Of the force F on the arm that turns with the second axis: -arm v x (F x u)."""
+        arm = self._arm(draft)
+        if arm == 0:
+            return ZERO
+        u, v = a.axes[AXES.index(self.turning[0])], b.axes[AXES.index(self.turning[1])]
+        force = ZERO
+        for f, e in zip(wrench.force, a.axes, strict=True):
+            force = plus(force, times(f, e.value))
+        return times(-arm, cross(v.value, cross(force, u.value)))
 
     def _straight(self, draft: Draft, a: Placed, b: Placed, wrench: Wrench) -> None:
         """The rows of a hinge, or those of none."""
