@@ -32,7 +32,8 @@ Arguments = Annotated[
     typer.Option(
         "-p",
         metavar="NAME=VALUE",
-        help="An argument of the file's function 'family', e.g. -p n=8; repeatable.",
+        help="An argument of the file's function 'family', e.g. -p n=8; of a URDF file -p base=floating, "
+        "-p motors=torque, -p angle.j2=0.5; repeatable.",
     ),
 ]
 AddOutput = Annotated[
@@ -58,7 +59,9 @@ Target = Annotated[
         help="native: compiled C, the default where there is a C compiler. python: run by SciPy.",
     ),
 ]
-ModelPath = Annotated[Path, typer.Argument(help="A Python file that defines a Model.")]
+ModelPath = Annotated[
+    Path, typer.Argument(help="A Python file that defines a Model, or a URDF file.")
+]
 FmuPath = Annotated[Path, typer.Argument(help="An FMU built by lagfmu.")]
 Settings = Annotated[
     Names,

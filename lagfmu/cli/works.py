@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 
 from ..errors import LagfmuError, UsageError
-from ..model.file import ModelFile, load
+from ..model.file import ModelFile, is_model, load
 from ..model.scene import Scene
 from ..verification.junit import Report, refused
 
@@ -31,7 +31,7 @@ def studied(
             done.append(refused(name, error))
 
     for path in paths:
-        if path.suffix != ".py":
+        if not is_model(path):
             tried(str(path), partial(Path, path))
             continue
         try:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import importlib.util
 import os
 import sys
@@ -17,6 +18,14 @@ from .family import made
 from .model import Model
 from .scene import Scene
 from .times import foreign_times
+
+# Files that are a model by themselves, by their ending: the module whose read(path, arguments) makes a Model.
+READERS = {".urdf": "lagfmu.bodies.urdf_model"}
+
+
+def is_model(path: str | os.PathLike[str]) -> bool:
+    """Whether a file is one that load() reads, by its ending."""
+    return Path(path).suffix.lower() in (".py", *READERS)
 
 
 @dataclass(frozen=True)
@@ -67,7 +76,7 @@ def in_scene(source: Model | str | os.PathLike[str], scene: Scene | str | None =
 
 def fmu_at(source: Model | str | os.PathLike[str], scene: Scene | str | None = None) -> Path | None:
     """The path, unless it is that of a model file.  Raises SettingError for a scene of an FMU."""
-    if isinstance(source, Model) or Path(source).suffix == ".py":
+    if isinstance(source, Model) or is_model(source):
         return None
     if scene is not None:
         raise SettingError(
@@ -78,7 +87,7 @@ def fmu_at(source: Model | str | os.PathLike[str], scene: Scene | str | None = N
 
 def load(path: str | os.PathLike[str], arguments: Sequence[str] = ()) -> ModelFile:
     """Run a model file and take its model; with `arguments`, NAME=VALUE, that which its function `family`
-    makes of them (family.py).
+    makes of them (family.py).  A file of another kind is read by its reader, and nothing in it is run.
 
     Raises ModelError if the file is missing, raises, or does not define exactly one Model.
     """
@@ -90,6 +99,8 @@ def load(path: str | os.PathLike[str], arguments: Sequence[str] = ()) -> ModelFi
         )
     if not file.is_file():
         raise ModelError(str(file), ["there is no such file"])
+    if (reader := READERS.get(file.suffix.lower())) is not None:
+        return _taken(file, importlib.import_module(reader).read(file, arguments), {})
     spec = importlib.util.spec_from_file_location(f"_lagfmu_model_{file.stem}", file)
     if spec is None or spec.loader is None:
         raise ModelError(str(file), ["expected a Python file that defines a Model, NAME.py"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from importlib.resources import files
 from pathlib import Path
 
@@ -56,6 +57,29 @@ closed_forms = [Conserved("energy", output("energy.total"))]
 '''
 
 
+READ = '''"""The robot of {file}.  Add motors, contacts and closed loops of your own, then:
+
+    lagfmu simulate {own} --plot out.svg
+"""
+
+from pathlib import Path
+
+from lagfmu import Scene
+from lagfmu.bodies import Gravity, from_urdf, mechanism
+
+robot = from_urdf(Path(__file__).parent / {path!r})
+model = mechanism(
+    robot.name,
+    bodies=robot.bodies,
+    joints=[*robot.joints],
+    loads=[Gravity((0, 0, -9.81)), *robot.loads],
+    start={{**robot.start}},  # e.g. "angle.j2": 0.5
+    description=robot.description,
+)
+scenes = [Scene(model.name, stop_time=1.0, step_size=0.01)]
+'''
+
+
 def folder() -> Path:
     """Where the models that come with lagfmu lie: in the installed package, or beside it in a checkout."""
     package = Path(str(files("lagfmu")))
@@ -75,11 +99,19 @@ def new(path: Path, source: str | None = None) -> Path:
     """
     if path.suffix != ".py":
         path = path.with_name(f"{path.name}.py")
-    if source is not None and source not in known():
-        raise UsageError(f"there is no model {source!r}, expected one of {', '.join(known())}")
+    read = Path(source) if source is not None and source.endswith(".urdf") else None
+    if read is not None and not read.is_file():
+        raise UsageError(f"there is no file {source!r}: correct the path")
+    if source is not None and read is None and source not in known():
+        raise UsageError(
+            f"there is no model {source!r}, expected a URDF file, or one of {', '.join(known())}"
+        )
     if path.exists():
         raise UsageError(f"{str(path)!r} is there already: choose another name")
-    if source is not None:
+    if read is not None:
+        there = Path(os.path.relpath(read, path.parent)).as_posix()
+        text = READ.format(file=read.name, own=path.name, path=there)
+    elif source is not None:
         text = (folder() / f"{source}.py").read_text(encoding="utf-8")
     else:
         words = "".join(c if c.isalnum() else " " for c in path.stem).split()

@@ -34,7 +34,7 @@ from ..fmu.session import (
 from ..fmu.target import PYTHON, target_of
 from ..fmu.write import as_built
 from ..interface.rules import problems_of
-from ..model.file import in_scene
+from ..model.file import in_scene, is_model
 from ..model.model import Model
 from ..model.scene import Scene
 from ..numeric.start_priority import LEFT_OUT, MISSES
@@ -94,7 +94,7 @@ def simulate(
             raise SettingError(f"{what} = {number!r} s, expected a positive number")
     if tolerance is not None and (problem := tolerance_problem(tolerance)):
         raise SettingError(problem)
-    if isinstance(source, (str, os.PathLike)) and Path(source).suffix == ".py":
+    if isinstance(source, (str, os.PathLike)) and is_model(source):
         source, scene, _ = in_scene(source, scene)
     if isinstance(source, Model):
         source = prepare(source, in_scene(source, scene).scene)

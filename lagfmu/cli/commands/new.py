@@ -15,7 +15,8 @@ from ..terminal import plainly, say, say_wrote
 def new(
     file: Annotated[Path, typer.Argument(help="The Python file to write.")],
     source: Annotated[
-        str | None, typer.Option("--from", help=f"Copy a model: {', '.join(known())}.")
+        str | None,
+        typer.Option("--from", help=f"A URDF file, or a model to copy: {', '.join(known())}."),
     ] = None,
 ) -> None:
     """Write a commented model to start from."""

@@ -30,13 +30,14 @@ def page(
     add_output: AddOutput = None,
 ) -> None:
     """Write one HTML file in which the FMU runs: offline, with sliders, curves and the mechanism."""
+    from ...model.file import is_model
     from ...studio.live.command import write_page
     from ..scenes import for_models, loaded, narrowed
 
     with plainly():
         source: Model | Path = target
         shown = None
-        if target.suffix == ".py":
+        if is_model(target):
             file = loaded(target, add_output, arguments)
             source = file.model
             shown = narrowed(file.called(scene)[:1], needs)[0]

@@ -33,13 +33,14 @@ def report(
     """Write what an FMU does as one file: the mechanism, equations, curves with events, forces with their
     extremes, verification, accuracy, versions."""
     from ...fmu.read import read_description, units_of
+    from ...model.file import is_model
     from ...studio.report.report import STUDIES
     from ...studio.report.report import report as written
     from ...verification.reference import Reference, read_table
 
     with plainly(), console.status(f"reporting on {source}"):
         known = {}
-        if set_ and source.suffix not in (*STUDIES, ".py"):
+        if set_ and source.suffix not in STUDIES and not is_model(source):
             known = units_of(read_description(source).modelVariables)
         done = written(
             source,

@@ -46,13 +46,14 @@ def simulate(
     others.
     """
     from ...fmu.read import read_description, units_of
+    from ...model.file import is_model
     from ...prepare.prepare import prepare
     from ...verification.simulate import simulate as simulated
     from ..scenes import for_models, loaded, narrowed
 
     with plainly():
         run: Any = source
-        if source.suffix == ".py":
+        if is_model(source):
             file = loaded(source, add_output, arguments)
             scenes = narrowed(file.called(scene), {"error_bars": error_bars})
             run = prepare(file.model, scenes[0])
