@@ -136,6 +136,7 @@ from .studio.tradeoff.quantities import OWN, quantities
 from .studio.tradeoff.reference import refer
 from .studio.tradeoff.report import table as tradeoff_table
 from .studio.tradeoff.setting import Setting
+from .verification import junit
 from .verification.closed_forms import applies, check_closed_form, landed
 from .verification.evaluate import Compiled
 from .verification.exit_codes import EXIT_CODES, NOT_RUN, TERMINATED, WRONG_USAGE

@@ -243,10 +243,9 @@ def test_the_file_of_the_documentation_holds(foreign, tmp_path):
     """What docs/verification.md says of the hemisphere, word for word, on the FMU without closed forms."""
     page = (Path(__file__).parent.parent / "docs" / "verification.md").read_text(encoding="utf-8")
     text = page.split("```toml\n")[1].split("```")[0]
-    (tmp_path / "reference").mkdir()
     begin = lagfmu.simulate(foreign, stop_time=0.1)["theta"][0]
-    (tmp_path / "reference" / "Hemisphere_ref.csv").write_text(f"time,theta\n0,{begin}\n")
     (tmp_path / "claims").mkdir()
+    (tmp_path / "claims" / "Hemisphere_ref.csv").write_text(f"time,theta\n0,{begin}\n")
     (tmp_path / "claims" / "claims.toml").write_text(text, encoding="utf-8")
     found = lagfmu.verify(foreign, statements=tmp_path / "claims" / "claims.toml")
     assert [c.verdict for c in found.checks[3:]] == ["pass"] * 6

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import re
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,6 +22,7 @@ from .target import NATIVE, PYTHON
 
 PLATFORMS = {"2": fmpy.platform, "3": fmpy.platform_tuple}  # of this machine, by version of FMI
 TYPES = {"Float64": "Real", "Int32": "Integer"}  # types of FMI 3.0 as FMI 2.0 calls them
+SHOWN = 5  # problems in a message
 MOST_POINTS = 10_000_000  # communication points of a run, all of which are kept
 Trajectory = NDArray[Any]  # structured: 'time' [s] and one field an output
 
@@ -145,11 +148,84 @@ def read_description(path: Path) -> Any:
                 )
             archive.read("modelDescription.xml")  # whole, which zipfile tells
     try:
-        return fmpy.read_model_description(str(path), validate=False)
+        found = fmpy.read_model_description(str(path), validate=False)
     except Exception as error:
         raise VerificationError(
-            f"{str(path)!r}: modelDescription.xml cannot be read ({error})"
+            f"{str(path)!r}: modelDescription.xml cannot be read ({error}): correct it, or build the FMU anew"
         ) from None
+    if problems := [*_of_experiment(found.defaultExperiment), *_of_variables(found)]:
+        more = f"; and {len(problems) - SHOWN} more" if len(problems) > SHOWN else ""
+        raise VerificationError(
+            f"{str(path)!r}: modelDescription.xml: {'; '.join(problems[:SHOWN])}{more}: correct it, or build "
+            "the FMU anew"
+        )
+    return found
+
+
+def _of_experiment(said: Any) -> list[str]:
+    """What is wrong with the default experiment."""
+    given = {
+        n: value
+        for n in ("startTime", "stopTime", "stepSize", "tolerance")
+        if (value := getattr(said, n, None)) is not None
+    }
+    problems = [
+        f"{n} is {value!r}, expected a finite number"
+        for n, value in given.items()
+        if not math.isfinite(_number(value))
+    ]
+    if problems:
+        return problems
+    problems = [
+        f"{n} is {given[n]!r}, expected a positive number"
+        for n in ("stepSize", "tolerance")
+        if n in given and _number(given[n]) <= 0
+    ]
+    start, stop = _number(given.get("startTime", 0)), given.get("stopTime")
+    if stop is not None and _number(stop) < start:
+        problems.append(f"stopTime is {stop!r}, expected one after the startTime {start!r}")
+    return problems
+
+
+def _of_variables(description: Any) -> list[str]:
+    """What is wrong with the names, references, numbers and derivatives of variables."""
+    variables = description.modelVariables
+    counts = Counter(v.name for v in variables)
+    problems = [f"several variables are called {n!r}" for n, k in counts.items() if k > 1]
+    for v in variables:
+        if not v.name:
+            problems.append("a variable has no name")
+        if v.name == "time" and v.causality in ("input", "output"):
+            problems.append(f"an {v.causality} is called 'time', which names the time itself")
+        whole: list[tuple[str, Any]] = [("valueReference", v.valueReference)]
+        if kind_of(v) == "Enumeration":
+            items = getattr(v.declaredType, "items", None) or []
+            whole += [(f"item {item.name!r}", item.value) for item in items]
+        problems += [
+            f"{v.name!r}: {what} is {value!r}, expected a whole number"
+            for what, value in whole
+            if not _number(value).is_integer()
+        ]
+        real = kind_of(v) == "Real"
+        numbers = {"min": v.min, "max": v.max} | ({"start": v.start} if real else {})
+        problems += [
+            f"{v.name!r}: {what} is {value!r}, expected a number"
+            for what, value in numbers.items()
+            if value is not None and math.isnan(_number(value))
+        ]
+    for u in description.derivatives:
+        if getattr(u.variable, "derivative", None) is None:
+            name = getattr(u.variable, "name", None)
+            problems.append(f"{name!r} is listed as a derivative, and does not say of what")
+    return problems
+
+
+def _number(value: Any) -> float:
+    """NaN for what is none."""
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        return math.nan
 
 
 def file_stem(description: Any) -> str:

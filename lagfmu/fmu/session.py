@@ -42,7 +42,7 @@ COLUMNS: dict[str, Any] = {"Real": np.float64, "Integer": np.int32, "Boolean": n
 Columns = Mapping[str, Sequence[float]]  # of inputs by name, a value a communication point
 
 
-class RefusalError(Exception):
+class RefusalError(SimulationError):
     """A call that did not return OK or a warning: which, its status, what the FMU said of it, and of a step
     the time [s] from which it did not go on."""
 

@@ -6,6 +6,7 @@ import contextlib
 import importlib.metadata
 import logging
 import os
+import stat
 import tempfile
 import zipfile
 from collections.abc import Iterator, Mapping, Sequence
@@ -237,11 +238,21 @@ def write_whole(path: Path, content: bytes) -> None:
     try:
         with os.fdopen(handle, "wb") as file:
             file.write(content)
-        os.chmod(name, 0o644)
+        os.chmod(name, _mode(path))
         os.replace(name, path)
     except OSError as error:
         Path(name).unlink(missing_ok=True)
         raise _unwritable(path, error) from None
+
+
+def _mode(path: Path) -> int:
+    """That of the file which is replaced, else what the umask leaves of a new one."""
+    try:
+        return stat.S_IMODE(path.stat().st_mode)
+    except OSError:
+        mask = os.umask(0o077)  # it can be read by setting it only
+        os.umask(mask)
+        return 0o666 & ~mask
 
 
 def _unwritable(path: Path, error: OSError) -> BuildError:

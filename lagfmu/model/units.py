@@ -45,6 +45,11 @@ def fraction(power: Any) -> Fraction:
 
 _SI = {symbol: _base_units(symbol)[1] for symbol in _SYMBOLS}
 _NAMES = {_REGISTRY.get_name(symbol): symbol for symbol in _SYMBOLS}  # pint's name -> our symbol
+LONGEST, MOST = 200, 99  # characters of a unit, and its largest exponent
+# one exponent; pint evaluates what it is handed, a power of a power too
+_EXPONENT = re.compile(
+    r"\s*\^\s*(?:-?\d{1,2}(?:\.\d{1,2})?|\(\s*-?\d{1,2}(?:\.\d{1,2}|\s*/\s*\d{1,2})?\s*\))(?!\w|\s*[\d.^])"
+)
 
 
 @dataclass(frozen=True)
@@ -206,6 +211,10 @@ def parse_scaled(text: str, what: str) -> DisplayUnit:
     expected = f"a unit such as {_EXAMPLES} was expected"
     if not isinstance(text, str):
         raise UnitError(f"{given}; {expected}: write the unit as text")
+    if len(text) > LONGEST:
+        raise UnitError(
+            f"{what} is given in a unit of {len(text)} characters ({text[:20]!r}...); {expected}: shorten it"
+        )
     marked = re.sub(r"(?<!\d)\.|\.(?!\d)|[·⋅]", "*", text.strip().replace("**", "^"))
     marked = re.sub(r"(?<=[^\W\d_])(-?\d)", r"^\1", marked)  # Modelica's m/s2
     factor = r"(?:\([^()]*\)|[^\s*/()^]+)(?:\s*\^\s*(?:-?[\d.]+|\([^()]*\)))?"
@@ -213,6 +222,10 @@ def parse_scaled(text: str, what: str) -> DisplayUnit:
         raise UnitError(
             f"{given}, whose product after '/' is ambiguous; {expected}: "
             "put the denominator in parentheses, as in 'J/(kg.K)'"
+        )
+    if not _is_product(marked):
+        raise UnitError(
+            f"{given}, which is not a unit; {expected}: write a product of units with exponents to {MOST}"
         )
     try:
         container = _REGISTRY.parse_units_as_container(marked.replace("^", "**"), as_delta=False)
@@ -223,6 +236,8 @@ def parse_scaled(text: str, what: str) -> DisplayUnit:
         raise UnitError(f"{given}, which is not a unit; {expected}: write the product as 'N.m'")
     if any(power.denominator != 1 for power in powers.values()):
         raise UnitError(f"{given}, with a fractional exponent; {expected}: use whole exponents")
+    if any(abs(power) > MOST for power in powers.values()):
+        raise UnitError(f"{given}; {expected}: use exponents to {MOST}")
     scale, coherent, multiple, offset = 1.0, ONE, False, False
     for name, power in powers.items():
         if name in _NAMES:
@@ -231,17 +246,34 @@ def parse_scaled(text: str, what: str) -> DisplayUnit:
         multiple = True
         size, base = _base_units(name)
         offset = offset or _REGISTRY.Quantity(0.0, name).to_base_units().magnitude != 0
-        scale *= size**power
+        scale *= _power(size, int(power))
         coherent *= _named(_unit(base)) ** power
     if offset:
         raise UnitError(
             f"{given}, an offset or logarithmic scale; equations are evaluated in coherent SI units: "
             f"give the value in {coherent.name!r}"
         )
+    if not 0 < scale < math.inf:
+        raise UnitError(
+            f"{given}, whose size is no number of double precision: use {coherent.name!r}"
+        )
     return DisplayUnit(" ".join(text.split()), coherent, scale, not multiple)
 
 
-QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\s\d.].*)?\Z")
+def _is_product(marked: str) -> bool:
+    """True if exponents are short numbers, none of them raised again, and no other numbers stand there."""
+    plain = _EXPONENT.sub(" ", marked)
+    return not re.search(r"\^|(?<!\w)(?!1(?![\w.]))\d", plain)
+
+
+def _power(size: float, power: int) -> float:
+    try:
+        return float(size**power)
+    except OverflowError:
+        return math.inf
+
+
+QUANTITY = re.compile(r"\s*([-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\s\d.].*)?\Z")
 
 
 def parse_quantity(text: str, unit: Unit, what: str) -> float:
@@ -249,10 +281,10 @@ def parse_quantity(text: str, unit: Unit, what: str) -> float:
 
     Raises UnitError for what is neither, and for a unit of another dimension than `unit`.
     """
-    found = QUANTITY.match(text)
+    found = QUANTITY.match(text) if len(text) <= LONGEST else None
     if found is None:
         raise UnitError(
-            f"{what} = {text!r} is no number, expected one in {unit.name}, or with a unit"
+            f"{what} = {text[:LONGEST]!r} is no number, expected one in {unit.name}, or with a unit"
         )
     if found[2] is None:
         return float(found[1])

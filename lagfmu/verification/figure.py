@@ -9,7 +9,8 @@ from typing import Any
 import matplotlib
 from matplotlib.figure import Figure
 
-from ..errors import BuildError, UsageError
+from ..errors import UsageError
+from ..fmu.write import write_whole
 
 STYLE: dict[str, Any] = {
     "axes.spines.top": False,
@@ -32,13 +33,17 @@ class Drawn(Figure):
 def save(figure: Figure, path: Path) -> Path:
     """Write it, the same bytes each time; the ending says the format.  Raises BuildError; UsageError for
     another ending."""
+    ending, drawn = path.suffix[1:], io.BytesIO()
+    metadata = {"Date": None} if ending == "svg" else {}
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        metadata = {"Date": None} if path.suffix == ".svg" else {}
         with matplotlib.rc_context({"svg.hashsalt": "lagfmu"}):
-            figure.savefig(path, metadata=metadata, dpi=150)
+            figure.savefig(drawn, format=ending or "png", metadata=metadata, dpi=150)
     except ValueError as error:
         raise UsageError(f"cannot write the figure {str(path)!r}: {error}") from None
-    except OSError as error:
-        raise BuildError(f"cannot write the figure {str(path)!r}: {error}") from None
+    write_whole(path, drawn.getvalue())
     return path
+
+
+def plain(text: str) -> str:
+    """A name or a unit as a label shows it: what stands between two dollars is no mathematics."""
+    return text.replace("$", r"\$")

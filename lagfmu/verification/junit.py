@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 from ..errors import LagfmuError, UsageError
 from .exit_codes import FAILS, HOLDS, NOT_RUN, VERDICTS, WRONG_USAGE
+
+# of XML 1.0
+NOT_IN_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
 @dataclass(frozen=True)
@@ -84,21 +88,26 @@ def as_junit(command: str, reports: Sequence[Report]) -> bytes:
 
     document = JUnitXml(command)
     for s in reports:
-        suite = TestSuite(s.file)
+        suite = TestSuite(_clean(s.file))
         for name, value in s.properties.items():
-            suite.add_property(name, value)
+            suite.add_property(_clean(name), _clean(value))
         if s.error:
-            case = TestCase("runs", s.file, 0.0)
-            case.result = [Error(s.error, VERDICTS[s.code])]
+            case = TestCase("runs", _clean(s.file), 0.0)
+            case.result = [Error(_clean(s.error), VERDICTS[s.code])]
             suite.add_testcase(case)
         for c in s.cases:
-            case = TestCase(c.name, c.group, round(c.seconds, 6))
+            case = TestCase(_clean(c.name), _clean(c.group), round(c.seconds, 6))
             if c.failure:
-                case.result = [Failure(c.failure, "statement")]
+                case.result = [Failure(_clean(c.failure), "statement")]
             elif c.skipped:
-                case.result = [Skipped(c.skipped)]
+                case.result = [Skipped(_clean(c.skipped))]
             suite.add_testcase(case)
         document.add_testsuite(suite)
     document.update_statistics()
     text: bytes = document.tostring()
     return text
+
+
+def _clean(text: str) -> str:
+    """What XML cannot hold, as a mark."""
+    return NOT_IN_XML.sub("\N{REPLACEMENT CHARACTER}", text)

@@ -43,12 +43,12 @@ def plot(
 
     Raises SettingError if a name is unknown or the file cannot be written.
     """
-    from .figure import save
+    from .figure import plain, save
 
     chosen = _chosen(result, names)
     with panels(result, units, chosen) as (figure, _):
         if title:
-            figure.suptitle(title, fontsize=12)
+            figure.suptitle(plain(title), fontsize=12)
         return save(figure, Path(out))
 
 
@@ -56,9 +56,11 @@ def figure_of(
     result: Trajectory, units: Mapping[str, str], names: Sequence[str] = (), title: str = ""
 ) -> Any:
     """The same as a matplotlib Figure.  Raises SettingError if a name is unknown."""
+    from .figure import plain
+
     with panels(result, units, _chosen(result, names)) as (figure, _):
         if title:
-            figure.suptitle(title, fontsize=12)
+            figure.suptitle(plain(title), fontsize=12)
     return figure
 
 
@@ -80,7 +82,7 @@ def panels(
     """The figure and its panels, one a unit, multipliers first, while the style of it holds."""
     import matplotlib as mpl
 
-    from .figure import STYLE, Drawn
+    from .figure import STYLE, Drawn, plain
 
     known = list(result.dtype.names or ())
     members_of: dict[tuple[bool, str, str], list[str]] = {}
@@ -99,11 +101,11 @@ def panels(
                     color=colour,
                     linestyle=DASHES[k // 4 % len(DASHES)],
                     drawstyle="steps-post" if counts else "default",
-                    label=_label(result, n),
+                    label=plain(_label(result, n)),
                     linewidth=1.8,
                 )
                 _band(axis, result, n, colour)
-            axis.set_ylabel(f"[{for_reading(unit)}]" if for_reading(unit) else "")
+            axis.set_ylabel(plain(f"[{for_reading(unit)}]") if for_reading(unit) else "")
             axis.margins(x=0)
             _whole_ticks(axis, counts)
             _mark_events(axis, result, known, figure if axis is axes[0, 0] else None)
@@ -190,6 +192,8 @@ def moments(result: Trajectory, events: str, of: str) -> list[float]:
 def _mark_events(axis: Any, result: Trajectory, known: Sequence[str], figure: Any) -> None:
     """A line at each event; with `figure` the first of each kind is named, above the panel, in rows
     so that no name lies over another."""
+    from .figure import plain
+
     start, end = result["time"][0], result["time"][-1]
     named = []
     for events, (words, style) in SAID.items():
@@ -211,7 +215,7 @@ def _mark_events(axis: Any, result: Trajectory, known: Sequence[str], figure: An
         row = next((k for k, free in enumerate(taken) if free <= left), len(taken))
         taken[row : row + 1] = [left + width + wide]
         axis.annotate(
-            text,
+            plain(text),
             (moment, 1.0),
             (0, 3 + 11 * row),
             xycoords=("data", "axes fraction"),

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import csv
 import os
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -111,8 +112,12 @@ def read_table(path: Path, gaps: bool = False) -> Trajectory:
         raise SettingError(f"{str(path)!r} separates its columns by semicolons: {REMEDY}")
     if rows and all(len(row) == 2 * len(names) for row in rows):
         raise SettingError(f"{str(path)!r} has decimal commas: {REMEDY}")
-    if twice := sorted({n for n in names if names.count(n) > 1}):
+    if twice := sorted(n for n, count in Counter(names).items() if count > 1 and n):
         raise SettingError(f"{str(path)!r}: {', '.join(twice)} stands in two columns")
+    if "" in names:  # NumPy would call it f0, f1, ...
+        raise SettingError(
+            f"{str(path)!r}: column {names.index('') + 1} has no heading: give it one, or remove the column"
+        )
     table = np.zeros(len(rows), dtype=[(n, float) for n in names])
     bad: list[str] = []
     for k, row in enumerate(rows):

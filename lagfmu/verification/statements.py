@@ -157,7 +157,7 @@ def _made(
     if kind == "reference":
         if extra := sorted({"when", "scale", "name"} & set(entry)):
             raise ValueError(f"{', '.join(map(repr, extra))} is not for a reference")
-        return Reference(read_table(path.parent / entry["file"]), within, absolute)
+        return Reference(read_table(_within(path.parent, entry["file"])), within, absolute)
     formulas, problems = {}, []
     for key in FORMULAS:
         if key in entry:
@@ -176,6 +176,20 @@ def _made(
         DIRECTIONS[entry.get("direction", "rising")],
         int(entry.get("occurrence", 1)),
     )
+
+
+def _within(folder: Path, file: str) -> Path:
+    """A file that stands in the folder of the statements, or below.  Raises ValueError."""
+    if "\0" in file:
+        raise ValueError(f"file = {file!r}, expected the name of a CSV file")
+    found = folder / file
+    if not found.resolve().is_relative_to(folder.resolve()):
+        raise ValueError(
+            f"file = {file!r} stands outside the folder of the statements: put the table beside them"
+        )
+    if found.exists() and not found.is_file():  # a pipe has no end
+        raise ValueError(f"file = {file!r} is no file, expected a CSV file: put the table there")
+    return found
 
 
 def _is_number(value: Any) -> bool:

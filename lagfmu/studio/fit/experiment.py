@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -18,7 +17,6 @@ from ...model.units import parse_scaled, parse_unit
 from ...verification.reference import read_table
 
 Floats = NDArray[np.float64]
-HEADING = re.compile(r"(?P<name>.*?)\s*\[(?P<unit>[^\[\]]*)\]\s*\Z")  # force.A.x [kN]
 
 
 @dataclass(frozen=True)
@@ -150,15 +148,10 @@ def _in_si(
             table = table.reset_index()
         table = {str(n): table[n] for n in table.columns}
     names = table.dtype.names if isinstance(table, np.ndarray) else list(table)
+    known = {"time": "s", **units}
     found: dict[str, Floats] = {}
     for heading in names or ():
-        match = HEADING.match(str(heading))
-        known = {"time": "s", **units}
-        name, given = (
-            (match["name"], match["unit"])
-            if match and str(heading) not in known
-            else (str(heading), "")
-        )
+        name, given = _parts(str(heading)) if str(heading) not in known else (str(heading), "")
         factor = 1.0
         if given and name in known:
             try:
@@ -169,6 +162,15 @@ def _in_si(
             problems.append(f"{what}{name!r} stands in two columns")
         found[name] = np.asarray(table[heading], dtype=float) * factor
     return found
+
+
+def _parts(heading: str) -> tuple[str, str]:
+    """A name and its unit: force.A.x [kN]."""
+    text = heading.rstrip()
+    name, bracket, unit = text[:-1].rpartition("[")
+    if not (text.endswith("]") and bracket) or "]" in unit:
+        return heading, ""
+    return name.rstrip(), unit
 
 
 def _factor(given: str, unit: str | None, what: str) -> float:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...model.units import for_reading
-from ...verification.figure import STYLE, Drawn, save
+from ...verification.figure import STYLE, Drawn, plain, save
 from ...verification.plot import COLOURS
 
 Floats = NDArray[np.float64]
@@ -38,13 +38,15 @@ def draw(
         for k, output in enumerate(outputs):
             above, below = axes[0, k], axes[1, k]
             unit = for_reading(units.get(output))
-            above.set_title(f"{output} [{unit}]" if unit else output, loc="left", fontsize=10)
+            above.set_title(
+                plain(f"{output} [{unit}]" if unit else output), loc="left", fontsize=10
+            )
             for colour, (name, columns) in zip(cycle(COLOURS), tables.items(), strict=False):
                 if output not in columns:
                     continue
                 time, measured, fitted = columns[output]
                 order = np.argsort(time)
-                label = name if len(tables) > 1 else "measured"
+                label = plain(name) if len(tables) > 1 else "measured"
                 above.plot(time, measured, "o", ms=3, color=colour, alpha=0.6, label=label)
                 told = None if len(tables) > 1 else "fitted"
                 above.plot(time[order], fitted[order], color=colour, lw=1.4, label=told)
@@ -54,5 +56,5 @@ def draw(
             below.set_ylabel("residual, in\nstandard deviations" if k == 0 else "")
             below.set_xlabel("time [s]")
             above.legend(frameon=False, fontsize=9)
-        figure.suptitle(title, fontsize=11)
+        figure.suptitle(plain(title), fontsize=11)
         return figure if out is None else save(figure, Path(out))

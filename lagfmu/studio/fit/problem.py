@@ -143,7 +143,14 @@ def problem_of(
         {n: u or "1" for n, u in units.items()},
     )
     if made.points < len(made.free):
-        raise SettingError(f"{made.points} measured numbers for {len(made.free)} unknowns")
+        raise SettingError(
+            f"{made.points} measured numbers for {len(made.free)} unknowns: measure more, or free fewer"
+        )
+    if made.points == len(made.free) and None in made.deviations.values():
+        raise SettingError(
+            f"{made.points} measured numbers for as many unknowns leave no residuals, which tell how well "
+            "they are known: measure more, free fewer values, or give standard deviations (OUTPUT:DEVIATION)"
+        )
     return made
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...verification.figure import STYLE, Drawn, save
+from ...verification.figure import STYLE, Drawn, plain, save
 from ...verification.plot import COLOURS
 
 MOST = 12  # bars of one output
@@ -36,10 +36,10 @@ def tornado(
             colours = [COLOURS[0] if x >= 0 else COLOURS[1] for x in lengths]
             spread = None if errors is None else [errors[output][n] for n, _ in rows]
             panel.barh(places, lengths, color=colours, xerr=spread, height=0.7)
-            panel.set_yticks(places, [n for n, _ in rows])
+            panel.set_yticks(places, [plain(n) for n, _ in rows])
             panel.axvline(0, color="#48525e", lw=1)
-            panel.set_title(output, loc="left", fontsize=10)
+            panel.set_title(plain(output), loc="left", fontsize=10)
             panel.grid(visible=False, axis="y")
-        panels[-1].set_xlabel(label)
-        figure.suptitle(title, fontsize=11)
+        panels[-1].set_xlabel(plain(label))
+        figure.suptitle(plain(title), fontsize=11)
         return figure if out is None else save(figure, Path(out))

@@ -47,8 +47,10 @@ def _drawn(found: Any, name: str) -> Any:
 
 
 def _label(found: Any, name: str) -> str:
+    from ...verification.figure import plain
+
     unit = for_reading(found[name].attrs.get("units", ""))
-    return f"{name} [{unit}]" if unit else name
+    return plain(f"{name} [{unit}]" if unit else name)
 
 
 def _grid(found: Any, names: list[str], dims: list[str], Figure: Any) -> Any:

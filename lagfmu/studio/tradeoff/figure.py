@@ -25,7 +25,7 @@ def draw(found: Tradeoff, out: Path) -> Path:
     import matplotlib as mpl
     from matplotlib.figure import Figure
 
-    from ...verification.figure import STYLE, save
+    from ...verification.figure import STYLE, plain, save
 
     factor = 1e3 / found.simulated
     with mpl.rc_context(STYLE | {"font.size": 10, "hatch.linewidth": 0.4}):
@@ -39,10 +39,12 @@ def draw(found: Tradeoff, out: Path) -> Path:
         _winners(axis, found, factor)
         _limits(axis, found)
         what = "λ" if found.headline == MULTIPLIER else found.headline
-        axis.set_xlabel(f"largest error of {what}, relative to its largest magnitude")
+        axis.set_xlabel(f"largest error of {plain(what)}, relative to its largest magnitude")
         axis.set_ylabel("wall time per simulated second in ms")
         step = found.points[0].setting.communication
-        axis.set_title(f"{found.name} ({found.target} FMU), every {step:.3g} s", fontsize=10.5)
+        axis.set_title(
+            f"{plain(found.name)} ({found.target} FMU), every {step:.3g} s", fontsize=10.5
+        )
         figure.legend(loc="outside right upper", frameon=False, fontsize=9)
         return save(figure, out)
 
