@@ -225,7 +225,7 @@ def parse_scaled(text: str, what: str) -> DisplayUnit:
         )
     if not _is_product(marked):
         raise UnitError(
-            f"{given}, which is not a unit; {expected}: correct the unit to a product with exponents to {MOST}"
+            f"{given}, which is not a unit; {expected}: correct the unit (exponents to {MOST})"
         )
     try:
         container = _REGISTRY.parse_units_as_container(marked.replace("^", "**"), as_delta=False)
