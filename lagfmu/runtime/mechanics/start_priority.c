@@ -61,5 +61,8 @@ Status priority_nearest(Mechanism *b, const Priority *priority, int stage, const
     }
     for (int e = 0; e < s->entries; e++)
         if ((int)priority[s->entry_column[e]] > stage) b->G[e] = 0;
-    return linear_project(&b->linear, b->M, b->G, own, c, b->dq);
+    const Status status = linear_project(&b->linear, b->M, b->G, own, c, b->dq);
+    for (int j = 0; j < s->nv; j++)
+        if ((int)priority[j] > stage) b->dq[j] = 0; /* where M is singular, rounding may be left */
+    return status;
 }

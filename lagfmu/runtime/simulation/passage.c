@@ -36,6 +36,8 @@ static const double LOOK_AHEAD = 1e-4; /* natural times, in which it is seen how
 static const double LANDED = 1e-3;    /* angle below which a step ended in a crossing, from which none begins */
 static const double PLACED = 1e-9;   /* of a step: how well the time of a passage is found */
 static const double BESIDE = 1e-3;   /* of a step: how far beside it all rows are looked at */
+static const double BEGUN = 1e-6;    /* angle below which no motion begins, ... */
+static const double BEGUN_BESIDE = 1e-3, OPENS = 10; /* ... if it is so many times as wide a part of a size further on */
 static const double NAMING = 1e-5;   /* how far off the constraints a state is taken to be that the rows are
                                       * named at: linear_rank_threshold() */
 
@@ -187,4 +189,47 @@ static void explain(Solver *s) {
                    digits(i->t).text, rows.text);
 }
 
-SHARED_VALUE const Passage PASSAGE = {look, longest, stage, suspected, landed, find_passage, explain};
+/* How far apart as many rows are as are independent; < 0: it is not known. */
+static double rows_apart(Solver *s, double t, const double *y) {
+    Mechanism *b = &s->stepped;
+    if (!s->state.now.dependent) return factor_there(s, t, y, DBL_MIN) == OK ? linear_apart(&b->linear) : -1;
+    if (mechanism_motion(b, segment_instant(s, t), y, y + s->system->nq, s->active) != OK) return -1;
+    return linear_furthest_apart(&b->linear);
+}
+
+/* The same where the motion has gone on by a part of what it moves through; 0: nothing moves. */
+static double apart_beside(Solver *s, double t, double *y) {
+    const int nq = s->system->nq;
+    Mechanism *b = &s->stepped;
+    double *there = s->work_passage, fastest = 0;
+    for (int i = 0; i < s->system->nv; i++) {
+        const int dimension = s->system->speed_dimension[i];
+        const double span = dimension == s->system->angles ? 1 : mechanism_largest_alike(s->system, dimension, s->state.span);
+        if (span > 0) fastest = fmax(fastest, fabs(s->state.v[i]) / span);
+    }
+    if (!(fastest > 0)) return 0;
+    mechanism_kinematics(b, segment_instant(s, t), y);
+    mechanism_rates(b, y + nq, there);
+    for (int j = 0; j < nq; j++) there[j] = y[j] + BEGUN_BESIDE / fastest * there[j];
+    memcpy(there + nq, y + nq, (size_t)s->system->nv * sizeof *y);
+    return rows_apart(s, t, there);
+}
+
+/* Speeds are known there to eps / apart, and multipliers, which are what is left of their squares, to eps / apart^2. */
+static Status begins(Solver *s) {
+    const double t = s->state.now.t;
+    double *y = s->work_advance;
+    Why rows = {""};
+    state_gather(s->system, s->state.q, s->state.v, y);
+    const double apart = rows_apart(s, t, y);
+    if (!(apart >= 0 && apart < BEGUN) || !(apart_beside(s, t, y) > OPENS * apart)) return OK; /* or they stay as they are */
+    if (factor_there(s, t, y, NAMING) != OK) return FAILED;
+    (void)name_rows(s, &rows);
+    return fail(&s->why,
+                "next to these start values the configuration is singular: the constraints %s depend on each other, "
+                "another branch of the motion begins, and multipliers have no digits (the sine of the angle between the "
+                "rows is %.3g, expected at least %.3g): start further beside it, and give the speeds of one branch",
+                rows.text, apart, BEGUN);
+}
+
+SHARED_VALUE const Passage PASSAGE = {look, longest, stage, suspected, landed, find_passage, begins, explain};
