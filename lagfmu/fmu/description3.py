@@ -21,6 +21,7 @@ from .described import (
     typed,
 )
 
+ROUNDS_EACH = "-ffp-contract=off"  # bits depend on it: each operation is rounded by itself
 VERSION, TOKEN = "3.0", "instantiationToken"
 TYPES = {"Real": "Float64", "Integer": "Int32"}  # the others are called the same
 
@@ -121,7 +122,7 @@ def build_description(identifier: str, sources: Sequence[str]) -> bytes:
     """sources/buildDescription.xml: what a recompilation of the library `identifier` needs."""
     root = Element("fmiBuildDescription", {"fmiVersion": VERSION})
     parent = SubElement(root, "BuildConfiguration", {"modelIdentifier": identifier})
-    files = SubElement(parent, "SourceFileSet", {"language": "C99"})
+    files = SubElement(parent, "SourceFileSet", {"language": "C99", "compilerOptions": ROUNDS_EACH})
     for file in sources:
         SubElement(files, "SourceFile", {"name": file})
     return as_text(root)

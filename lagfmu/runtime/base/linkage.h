@@ -7,6 +7,10 @@
 #ifndef LAGFMU_LINKAGE_H
 #define LAGFMU_LINKAGE_H
 
+#ifdef __clang__
+#pragma STDC FP_CONTRACT OFF /* each operation is rounded by itself, whatever the options; gcc does so with -std=c99 */
+#endif
+
 #ifndef LAGFMU_IN_ONE_FILE
 #define SHARED extern
 #define SHARED_VALUE
