@@ -103,6 +103,34 @@ def test_an_error_is_what_noise_does(pendulum, swing, tmp_path):
         assert np.median([f.errors[name] for f in drawn]) == pytest.approx(spread, rel=0.3)
 
 
+def test_few_measurements_tell_little_of_their_scatter(pendulum, swing):
+    """Four angles and one unknown length leave three degrees of freedom: the deviation is that of the
+    residuals over three, and the interval is Student's, 3.182446 standard errors wide to each side (table of
+    the t distribution, 97.5 %, 3).  With a deviation that is given it is the normal distribution's 1.959964,
+    and scales with it."""
+    rows = slice(4, 16, 3)
+    data = {n: column[rows] for n, column in noisy(swing, 3, theta=0.01).items()}
+    others = {"m": 2.5}
+
+    def half(found):
+        low, high = found.intervals["L"]
+        assert (low + high) / 2 == pytest.approx(found.values["L"], rel=1e-12)
+        return (high - low) / 2 / found.errors["L"]
+
+    found = lagfmu.fit(pendulum, data, ["L"], ["theta"], start_values=others)
+    run = lagfmu.simulate(
+        pendulum, stop_time=1.5, step_size=0.1, start_values=others | {"L": found.values["L"]}
+    )
+    off = run["theta"][rows] - data["theta"]
+    (deviation,) = found.deviations.values()
+    assert deviation == pytest.approx(np.sqrt(off @ off / 3), rel=1e-3)
+    assert half(found) == pytest.approx(3.182446, rel=1e-6)
+    for given in (0.01, 0.02):
+        known = lagfmu.fit(pendulum, data, ["L"], {"theta": given}, start_values=others)
+        assert half(known) == pytest.approx(1.959964, rel=1e-6)
+        assert known.errors["L"] / given == pytest.approx(found.errors["L"] / deviation, rel=1e-2)
+
+
 @pytest.mark.thorough
 @pytest.mark.parametrize("known", [True, False], ids=["known", "estimated"])
 def test_the_interval_holds_the_truth_in_95_of_100(pendulum, swing, known, tmp_path):

@@ -60,6 +60,24 @@ def test_the_figures_are_those_of_the_run(page, native_fmu):
     assert float(event[2]) == pytest.approx(left, rel=1e-8)
 
 
+def test_extremes_without_a_watch_on_peaks_are_those_of_the_table(python_fmu, tmp_path):
+    """An FMU without the outputs peak.*: the smallest value stands before the largest, each with its own
+    time; lambda = -m (g cos theta + L theta'^2)/(2 L) of a pendulum at rest at theta_0 is nearest to 0 where
+    it turns and largest in magnitude, m g (3 - 2 cos theta_0)/(2 L), at the bottom."""
+    fmu = python_fmu("PendulumAngle")
+    out = tmp_path / "pendulum.html"
+    run("report", fmu, "--out", out, "--stop-time", 3)
+    told = lagfmu.simulate(fmu, stop_time=3)
+    assert not [n for n in told.dtype.names if n.startswith("peak")]
+    row = table(html.parse(str(out)).getroot(), "Extremes of the forces")[0]
+    force, time = told["lambda.rod"], told["time"]
+    expected = [force.min(), time[force.argmin()], force.max(), time[force.argmax()]]
+    assert row[0] == "lambda.rod"
+    assert [float(cell) for cell in row[1:5]] == pytest.approx(expected, rel=1e-4)
+    angle = told["theta"]
+    assert abs(angle[force.argmin()]) < 0.1 < abs(angle[force.argmax()])
+
+
 def test_what_it_says_of_accuracy_is_the_distance_to_a_closer_run(page, native_fmu):
     """lambda along a run at the tolerance and at a hundredth of it; none is farther off than a closed form
     allows."""
