@@ -231,6 +231,25 @@ def test_an_input_drives_the_run(native_fmu):
     assert found.values["M"] == pytest.approx(1.7, rel=1e-6)
 
 
+def test_a_force_that_jumps_is_read_by_the_clock_of_its_table(native_fmu):
+    """A force of 3 N that 40 times is switched on or off, in a table whose clock is 0.02 s late: the cart's
+    mass and the clock, from how it answers.  Whatever offset a search tries, no jump is put off by a step."""
+    fmu = native_fmu("CartPendulum")
+    jumps = np.sort(np.random.default_rng(5).uniform(0.01, 1.99, 40))
+    time = np.sort(np.concatenate([np.linspace(0, 2, 41), jumps, jumps]))
+    signal = np.zeros(len(time), dtype=[("time", float), ("F", float)])
+    signal["time"] = time
+    switched = np.concatenate([[False], np.diff(time) == 0])
+    signal["F"] = 3.0 * (np.cumsum(switched) % 2)
+    run = lagfmu.simulate(fmu, stop_time=2, step_size=0.05, inputs=signal, start_values={"M": 1.7})
+    answer = np.full(len(time), np.nan)
+    answer[np.searchsorted(time, run["time"])] = run["x"]
+    table = {"time": time + 0.02, "F": signal["F"], "x": answer}
+    found = lagfmu.fit(fmu, table, {"M": (0.5, 5.0)}, step_size=0.05, offset=0.05)
+    expected = {"M": 1.7, "offset.experiment 1": 0.02}
+    assert found.values == pytest.approx(expected, rel=1e-6)
+
+
 def test_a_value_at_its_bound_is_said(pendulum, swing):
     """The data ask for 0.8 m where 0.7 m is allowed."""
     found = lagfmu.fit(pendulum, swing, {"L": (0.1, 0.7, 0.5)}, {"theta": 1e-3})

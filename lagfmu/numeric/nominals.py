@@ -129,9 +129,18 @@ def natural(
     rate = max(_rate(system, span, told, pull, span > 0), fastest)
     rate = rate or _rate(system, span, speed, felt, span > 0)
     span = in_speeds(system, size)
-    own = np.sqrt(span * felt)
+    own = np.sqrt(span * _beyond_rounding(now))
     natural = span * rate
     return size, rate, np.where((own > 0) & ((own < natural) | (natural == 0)), own, natural)
+
+
+def _beyond_rounding(now: Motion) -> Vector:
+    """What is felt (nv), but 0 where it is rounding of what the others feel, compared as sqrt(mass) times
+    acceleration: out of the plane in which a mechanism moves no force acts."""
+    mass, felt = now.M.diagonal(), now.felt
+    strength = np.sqrt(np.maximum(mass, 0.0)) * felt
+    lost = (mass > 0) & (strength <= LOST * strength.max(initial=0.0))
+    return np.where(lost, 0.0, felt)
 
 
 def _held(

@@ -129,13 +129,16 @@ class Residuals:
         values = dict(self.given) | dict(one.values)
         values |= {f.name: float(v) for f, v in own.items() if not f.of}
         shift = sum(float(v) for f, v in own.items() if f.of == one.name)
-        wanted = one.time - shift
-        times = np.unique(np.concatenate([[0.0], wanted]))
+        clock = np.unique(
+            np.concatenate([[shift], one.time])
+        )  # the table's, in which its jumps are exact
         drive: Mapping[str, Sequence[float]] = {}
         if one.inputs is not None:
-            times = np.union1d(times, communication_points(float(times[-1]), self.step))
-            times = np.union1d(times, jumps(one.inputs, times))
-            drive = columns_at(one.inputs, times + shift, self.session.rules)
+            points = shift + communication_points(float(clock[-1] - shift), self.step)
+            clock = np.union1d(clock, points[points < clock[-1]])
+            clock = np.union1d(clock, jumps(one.inputs, clock))
+            drive = columns_at(one.inputs, clock, self.session.rules)
+        times = clock - shift
         if len(times) == 1:
             times = np.array([0.0, self.step])
         self.runs += 1
@@ -145,7 +148,7 @@ class Residuals:
         if run.refusal is not None:
             raise run.refusal
         self.moved = run.moved
-        return run.rows[np.searchsorted(times, wanted)]
+        return run.rows[np.searchsorted(clock, one.time)]
 
 
 def _derivative(output: str, by: str) -> str:
