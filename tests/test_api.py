@@ -147,7 +147,7 @@ def test_without_a_compiler_what_slips_is_refused_with_the_remedy(monkeypatch):
     package that compiles it."""
     monkeypatch.setattr(targets, "find_compiler", lambda: None)
     file = model_file("belt")
-    told = r"does not slip \(friction 'grip'\); build --target native \(.*pip install ziglang"
+    told = r"it has no friction \('grip'\); build --target native \(.*pip install ziglang"
     with pytest.warns(NoCompilerWarning), pytest.raises(BuildError, match=told):
         simulate(file.model, 0.1, scene=file.scenes[0])
 

@@ -89,7 +89,7 @@ Status exchange_nominals(Instance *x, double *nominals) {
     for (int j = 0; j < states; j++) nominals[place_of(system, j)] = scale[j];
     if (EXCHANGE_LOST) nominals[states] = nominal_energy(&x->solver);
     for (int j = 0; j < states + EXCHANGE_LOST; j++)
-        if (!(nominals[j] > 0)) nominals[j] = 1;
+        if (!(nominals[j] > STILL)) nominals[j] = 1; /* nothing tells it: FMI's own where none is given */
     return OK;
 }
 

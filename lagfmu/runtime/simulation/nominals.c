@@ -39,7 +39,6 @@
 
 static const double MEASURED_PART = 1e-3; /* of the first step, in which a motion without scale is measured */
 static const double SHAKEN = 1e9; /* times the tolerance: roundings of q that an error of v may reach */
-static const double STILL = 1e-100; /* scale of what neither moves nor is pushed: anything else exceeds it */
 static const double FASTEST = 1e150; /* [1/s] of a motion */
 static const double SIDES = 0.61803398874989485; /* golden ratio: its multiples fall on both sides in no period */
 static const double UNTOLD = -1; /* what no size and no rate is: those of one dimension are found together */
