@@ -72,12 +72,15 @@ def test_above_the_sphere_or_too_fast_for_it_the_particle_flies(native_fmu, a, r
     np.testing.assert_allclose(run["r"] * np.cos(run["theta"]), z, rtol=0, atol=1e-11)
 
 
-@pytest.mark.parametrize(("rise", "rests"), [(1e-13, True), (1e-6, False)])
+@pytest.mark.parametrize(("rise", "rests"), [(1e-15, True), (1e-13, False), (1e-6, False)])
 def test_what_parts_too_slowly_to_be_seen_rests(native_fmu, rise, rests):
-    """At the top it would rise by v^2/(2 g): by less than the gap within which contacts touch, 1e-9 of the
-    radius, it rests as after an impact, lambda = m g, instead of a flight that ends at no certain time;
-    by more, it flies."""
+    """At the top it would rise by v^2/(2 g): by less than 64 roundings (2.2e-16) of the radius it
+    rests as after an impact, lambda = m g, instead of a flight that ends at no certain time; by more, it
+    flies, and lands to rest."""
     with instance(native_fmu("Hemisphere")) as one:
         one.start({"theta": 0.0, "der(r)": np.sqrt(2 * 9.81 * rise)})
         assert bool(one.get("contact.surface")) == rests
         assert one.get("lambda.surface") == pytest.approx(9.81 if rests else 0.0, rel=1e-12)
+        one.step(0.01)
+        assert one.get("contact.surface")
+        assert one.get("lambda.surface") == pytest.approx(9.81, rel=1e-9)
