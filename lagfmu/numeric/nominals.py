@@ -114,7 +114,9 @@ def natural(
             continue
         if LOST * pull >= A:
             A = pull  # at rest: what is left is rounding of forces that cancel
-        rate = max(steady, pull / V if V > 0 else 0.0)
+        place = size[known & (np.array(system.dimension) == system.dimension[j])].max(initial=0.0)
+        moves = LOST * np.sqrt(place * pull) < V  # else it is rounding of what forces give
+        rate = max(steady, pull / V if moves else 0.0)
         if rate > 0:
             # one that is hardly pushed moves no farther than the others do
             rate = max(rate, slowest)

@@ -291,7 +291,12 @@ static double find_own(Solver *s, double span, const double *felt, double *own, 
     for (int j = 0; j < system->nq; j++) {
         if (own[j] >= 0) continue;
         const double speed = mechanism_largest_alike(system, system->dimension[j], s->state.v);
-        double rate = larger(steady, speed > 0 ? mechanism_largest_alike(system, system->dimension[j], felt) / speed : 0);
+        const double pull = mechanism_largest_alike(system, system->dimension[j], felt);
+        double place = 0;
+        for (int i = 0; i < system->nq; i++)
+            if (system->dimension[i] == system->dimension[j]) place = larger(place, s->state.size[i]);
+        const int moves = speed > LOST * sqrt(place) * sqrt(pull); /* else it is rounding of what forces give */
+        double rate = larger(steady, moves ? pull / speed : 0);
         if (rate > 0) rate = larger(rate, slowest);
         rate = bounded(rate);
         natural = larger(natural, rate);
