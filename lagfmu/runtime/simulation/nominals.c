@@ -229,13 +229,16 @@ static void find_masses(const Mechanism *b, double *mass) {
         if (s->mass_row[e] == s->mass_column[e]) mass[s->mass_row[e]] = b->M[e];
 }
 
-/* Accelerations (nv) before forces cancel.  Times the root of its mass all have one dimension, in which what is
+/* Accelerations (nv), finite, before forces cancel.  Times the root of its mass all have one dimension, in which what is
  * rounding of the largest is none: where no force has a lever arm, that of a torque would be all that turns a body. */
 static void find_felt(const Mechanism *b, double *work, double *felt) {
     double most = 0;
     mechanism_at_work(b, work, felt);
     find_masses(b, work);
-    for (int j = 0; j < b->system->nv; j++) most = larger(most, sqrt(work[j]) * felt[j]);
+    for (int j = 0; j < b->system->nv; j++) {
+        felt[j] = felt[j] < DBL_MAX ? felt[j] : DBL_MAX;
+        most = larger(most, sqrt(work[j]) * felt[j]);
+    }
     for (int j = 0; j < b->system->nv; j++)
         if (sqrt(work[j]) * felt[j] < DBL_EPSILON * most) felt[j] = 0;
 }
