@@ -103,7 +103,10 @@ def load(path: str | os.PathLike[str], arguments: Sequence[str] = ()) -> ModelFi
         return _taken(file, importlib.import_module(reader).read(file, arguments), {})
     spec = importlib.util.spec_from_file_location(f"_lagfmu_model_{file.stem}", file)
     if spec is None or spec.loader is None:
-        raise ModelError(str(file), ["expected a Python file that defines a Model, NAME.py"])
+        others = "".join(f", or NAME{ending}" for ending in READERS)
+        raise ModelError(
+            str(file), [f"expected a Python file that defines a Model, NAME.py{others}"]
+        )
     module = importlib.util.module_from_spec(spec)
     folder = str(file.resolve().parent)
     sys.path.insert(0, folder)

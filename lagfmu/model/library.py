@@ -99,7 +99,7 @@ def new(path: Path, source: str | None = None) -> Path:
     """
     if path.suffix != ".py":
         path = path.with_name(f"{path.name}.py")
-    read = Path(source) if source is not None and source.endswith(".urdf") else None
+    read = Path(source) if source is not None and Path(source).suffix.lower() == ".urdf" else None
     if read is not None and not read.is_file():
         raise UsageError(f"there is no file {source!r}: correct the path")
     if source is not None and read is None and source not in known():
