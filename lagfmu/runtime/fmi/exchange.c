@@ -153,8 +153,6 @@ Status exchange_lead_back(Instance *x) {
     return OK;
 }
 
-static int larger_of(int a, int b) { return a > b ? a : b; }
-
 /* The longest step along a direction that moves nothing by more than DISPLACEMENT of its size. */
 static double step_along(const Solver *s, Direction d) {
     const System *system = s->system;
@@ -187,8 +185,9 @@ static Status find_beside(Instance *x, Direction d, double h, double *vdot) {
     Status status = mechanism_settle(&s->stepped, segment_instant(s, s->state.now.t), s->state.q);
     if (status == OK) status = exchange_evaluate(x);
     if (status == OK) memcpy(vdot, s->stepped.vdot, (size_t)nv * sizeof *vdot);
-    if (status == OK) status = find_way_back(x, x->back, NULL);
-    for (int i = 0; i < nv && status == OK; i++) vdot[i] += x->back[i];
+    double *a = x->back + nv;
+    if (status == OK) status = find_way_back(x, a, NULL);
+    for (int i = 0; i < nv && status == OK; i++) vdot[i] += a[i];
     state_scatter(system, y, s->state.q, s->state.v);
     memcpy(s->drive.value, u, (size_t)system->inputs * sizeof *u);
     s->state.now.t -= h * d.dt;
@@ -201,7 +200,7 @@ static Status find_beside(Instance *x, Direction d, double h, double *vdot) {
 static Status difference_along(Instance *x, Direction d, double *change) {
     const int nv = x->solver.system->nv;
     const double h = step_along(&x->solver, d);
-    double *before = x->back + nv;
+    double *before = x->back + 2 * nv;
     memset(change, 0, (size_t)nv * sizeof *change);
     if (!(h > 0)) return OK;
     const double t = x->solver.state.now.t;
@@ -216,7 +215,7 @@ Status exchange_differentiate(Instance *x, Direction d) {
     Mechanism *b = &s->stepped;
     Sensitivity *w = &s->sensitivity;
     const int nv = s->system->nv, m = s->system->m;
-    double *a = x->back, *mu = a + nv, *change = mu + larger_of(nv, m);
+    double *change = x->back, *a = change + nv, *mu = a + nv;
     if (s->state.now.dependent) return difference_along(x, d, change);
     if (find_way_back(x, a, mu) != OK) return FAILED;
     for (int i = 0; i < nv; i++) b->vdot[i] += a[i];

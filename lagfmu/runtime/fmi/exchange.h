@@ -23,10 +23,7 @@ SHARED Status exchange_derivatives(Instance *x, double *derivatives);
 SHARED int exchange_leads_back(const Instance *x);
 SHARED Status exchange_lead_back(Instance *x);
 SHARED Status exchange_differentiate(Instance *x, Direction d);
-static inline double exchange_change_of_vdot(const Instance *x, int i) {
-    const System *s = x->solver.system;
-    return x->back[s->nv + (s->nv > s->m ? s->nv : s->m) + i];
-}
+static inline double exchange_change_of_vdot(const Instance *x, int i) { return x->back[i]; }
 SHARED Status exchange_indicators(Instance *x, double *indicators);
 SHARED Status exchange_nominals(Instance *x, double *nominals);
 
