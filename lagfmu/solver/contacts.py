@@ -12,15 +12,13 @@ from dataclasses import replace
 import numpy as np
 
 from ..numeric.system import System, Vector
+from ..numeric.thresholds import ROUNDINGS, TOUCH
 from .complementarity import acting_together
 from .equations import Motion, Terms
 from .linear import rows_of
 from .state import Settings, State
 
-ROUNDINGS = 64 * float(np.finfo(float).eps)  # part of the largest term of f that is rounding
-TOUCHING = (
-    1e-9  # part of the way that a contact has been open, and of the terms of its rate, that is none
-)
+EPS = float(np.finfo(float).eps)
 
 
 def as_flags(system: System, rows: Collection[int]) -> tuple[bool, ...]:
@@ -35,36 +33,32 @@ def closed_rows(system: System, closed: Iterable[bool]) -> frozenset[int]:
 
 def opened(motion: Motion, t: float, q: Vector, state: State) -> State:
     """The state with how far its open contacts have been, q having been passed at t."""
-    f, terms, heights, extents = (
-        motion.residual(t, q),
-        None,
-        list(state.heights),
-        list(state.extents),
-    )
+    f, terms = motion.residual(t, q), None
+    heights, extents = list(state.heights), list(state.extents)
     for c, k in enumerate(motion.system.contacts):
         if state.closed[c] or not f[k] > heights[c]:
             continue
         terms = motion.magnitudes(t, q) if terms is None else terms
         heights[c], extents[c] = float(f[k]), max(extents[c], float(terms[k]))
-    return (
-        state if terms is None else replace(state, heights=tuple(heights), extents=tuple(extents))
-    )
+    if terms is None:
+        return state
+    return replace(state, heights=tuple(heights), extents=tuple(extents))
 
 
 def gap_of_rounding(motion: Motion, t: float, q: Vector, state: State) -> Vector:
     """(m) what f may be of a contact that touches: rounding of its terms, or next to nothing of the way that
     it has been open, or of its terms there where these are smaller, so that bounces end."""
-    gap: Vector = ROUNDINGS * motion.magnitudes(t, q)
+    gap: Vector = ROUNDINGS * EPS * motion.magnitudes(t, q)
     for c, k in enumerate(motion.system.contacts):
-        own = max(gap[k], ROUNDINGS * state.extents[c])
-        gap[k] = max(own, TOUCHING * min(state.heights[c], state.extents[c]))
+        own = max(gap[k], ROUNDINGS * EPS * state.extents[c])
+        gap[k] = max(own, TOUCH * min(state.heights[c], state.extents[c]))
     return gap
 
 
 def speed_of_rounding(terms: Terms, v: Vector, settings: Settings) -> Vector:
     """(m) what |G v - nu| may be of a contact at rest."""
     speed = np.maximum(np.abs(v), np.array(settings.swift))
-    reach: Vector = TOUCHING * (np.abs(terms.G) @ speed + np.abs(terms.nu))
+    reach: Vector = TOUCH * (np.abs(terms.G) @ speed + np.abs(terms.nu))
     return reach
 
 

@@ -94,12 +94,15 @@ def _settled(
     if any(s[k] < -slow[k] for k in touching):
         e = restitution(system, motion.p)
         struck = strike(motion, terms, v, touching, e, settings)
-        while low := {k for k in _hops(motion, terms, struck.v, touching, small, slow) if e[k]}:
-            e = np.where(np.isin(np.arange(len(e)), list(low)), 0.0, e)
-            struck = strike(
-                motion, terms, v, touching, e, settings
-            )  # the last impulse is that of rest
-        v = _without_hops(motion, terms, struck.v, touching, small, slow)
+        resting, hops = _low(motion, terms, struck.v, touching, small, slow)
+        while any(e[k] for k in hops):  # the last impulse is that of rest
+            e[[*hops]] = 0
+            struck = strike(motion, terms, v, touching, e, settings)
+            resting, hops = _low(motion, terms, struck.v, touching, small, slow)
+        v = struck.v
+        if hops:
+            rows = system.active(as_flags(system, resting | hops))
+            v = project_velocities(terms.of(rows), v)
         caught = v - struck.v  # a plastic impact: M caught = G^T Lambda with s+ = 0
         lost = struck.lost + float(caught @ terms.M @ caught) / 2
         state = replace(state, dissipated=state.dissipated + lost)
@@ -138,43 +141,26 @@ def _chosen(
     return closed_at_rest(motion, terms, resting, settings)
 
 
-def _hops(
+def _low(
     motion: Motion,
     terms: Terms,
     v: Vector,
     touching: Collection[int],
     small: Vector,
     slow: Vector,
-) -> set[int]:
-    """The contacts that would rise by no more than touching contacts may be apart, s^2 / (2 |f''|)."""
+) -> tuple[set[int], set[int]]:
+    """Of the contacts that touch, after an impact: those that rest, and those that rise, but by no more than
+    touching contacts may be apart, s^2 / (2 |f''|): so bounces, and a block's rocking, that would never end
+    do end."""
     s = terms.G @ v - terms.nu
     resting = {k for k in touching if abs(s[k]) <= slow[k]}
     rising = {k for k in touching if s[k] > slow[k]}
     if not rising:
-        return set()
+        return resting, set()
     rows = motion.system.active(as_flags(motion.system, resting))
     vdot, _, _ = motion.accelerations(terms.of(rows))
     fall = terms.gamma - terms.G @ vdot
-    return {k for k in rising if s[k] ** 2 <= 2 * fall[k] * small[k]}
-
-
-def _without_hops(
-    motion: Motion,
-    terms: Terms,
-    v: Vector,
-    touching: Collection[int],
-    small: Vector,
-    slow: Vector,
-) -> Vector:
-    """The velocities after an impact (n), in which contacts rest that would hardly rise: so bounces, and a
-    block's rocking, that would never end do end."""
-    hops = _hops(motion, terms, v, touching, small, slow)
-    if not hops:
-        return v
-    s = terms.G @ v - terms.nu
-    resting = {k for k in touching if abs(s[k]) <= slow[k]}
-    rows = motion.system.active(as_flags(motion.system, resting | hops))
-    return project_velocities(terms.of(rows), v)
+    return resting, {k for k in rising if s[k] ** 2 <= 2 * fall[k] * small[k]}
 
 
 def _left_behind(motion: Motion, settings: Settings, state: State, terms: Terms) -> frozenset[int]:
