@@ -15,6 +15,11 @@ from ..model.elements import Expr, Parameter
 Number = float | Expr | Parameter
 
 
+def several(values: Any) -> Sequence[Any]:
+    """A number, or a list of them, as a list."""
+    return values if isinstance(values, tuple | list) else (values,)
+
+
 @dataclass(frozen=True, eq=False)
 class Marker:
     """A frame on a body: its origin `point` [m] and its axes, in the body's own frame.

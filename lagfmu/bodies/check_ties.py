@@ -10,6 +10,7 @@ import sympy as sp
 from ..model.elements import Parameter, is_number
 from ..model.picture import Track
 from ..model.spline import Spline
+from .body import several
 from .curves import PointOnCurve
 from .joints import Gear, Joint, Planar, Universal, name_of_joint
 from .loads import Motor, Rotor, Torsion
@@ -91,7 +92,7 @@ def _of_constant(what: str, joint: Joint) -> Iterator[str]:
     word = f"friction_{'torque' if joint.turns else 'force'}"
     if joint.friction is not None:
         yield f"{what}: friction and {word} are given, expected one of them"
-    of = joint.constant if isinstance(joint.constant, tuple | list) else (joint.constant,)
+    of = several(joint.constant)
     numbers = [value_of(x) for x in of]
     if len(of) not in (1, 2) or any(is_number(x) and float(x) < 0 for x in numbers):
         yield f"{what}: {word} is {joint.constant!r}, expected one number of at least 0, or two"

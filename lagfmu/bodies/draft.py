@@ -19,6 +19,7 @@ from ..errors import UnitError
 from ..model.elements import (
     TIME,
     Constraint,
+    Contact,
     Expr,
     Friction,
     Input,
@@ -28,9 +29,10 @@ from ..model.elements import (
     is_number,
     name_of,
 )
+from ..model.reactions import multiplier
 from ..model.units import parse_scaled, parse_unit
 from ..names import derivative
-from .body import Body, Ground, Marker
+from .body import Body, Ground, Marker, several
 from .motion import Motion, Placed, Timed, about
 from .vectors import AXES, ZERO, Vector, cross, dot, minus, times
 
@@ -49,9 +51,10 @@ class Relative:
     """A motion that a joint leaves free: angle.A [rad] or position.A [m], and its two derivatives.
 
     What drives it acts along an axis of the first marker, or `along` a vector in the ground's axes, and is
-    part of the wrench of the `joint`, where that bears another name.
+    part of the wrench of the `joint`.
     """
 
+    joint: str
     name: str
     unit: str
     values: tuple[Expr, Expr, Expr]
@@ -59,17 +62,40 @@ class Relative:
     second: Placed
     axis: int
     along: Vector | None = None
-    joint: str = ""
+
+    @property
+    def shares(self) -> list[Expr]:
+        """Components along the axes of the first marker of what an effort of 1 acts along."""
+        if self.along is None:
+            return [sp.Integer(k == self.axis) for k in range(3)]
+        return [dot(e.value, self.along) for e in self.first.axes]
+
+    def report(self, draft: Draft, text: str, the: str = "") -> None:
+        """It and its two derivatives as outputs, where they are no coordinates."""
+        draft.relative[self.name] = self
+        words = "", f"rate of {the}", f"second derivative of {the}"
+        for order, expression in enumerate(self.values):
+            called = derivative(self.name, order)
+            if called not in draft.known:
+                unit = self.unit + ("", "/s", "/s^2")[order]
+                draft.report(called, expression, unit, words[order] + text)
+
+    def stop(self, draft: Draft, name: str, limits: Sequence[Any], restitution: Expr) -> None:
+        """Contacts at its limits, NAME.lower and NAME.upper, as part of the joint's wrench."""
+        for which, sign, value in zip(("lower", "upper"), (1, -1), limits, strict=True):
+            row = f"{name}.{which}"
+            end = draft.number(value, row, self.unit, f"{which} limit of {self.name}")
+            text = f"{self.name} stops at its {which} limit"
+            gap = sign * (self.values[0] - end)
+            draft.constraints.append(Contact(row, gap, text, restitution))
+            self.transmit(draft, sign * multiplier(row))
 
     def transmit(self, draft: Draft, effort: Expr) -> None:
-        """The effort of a motor as part of the joint's wrench."""
-        wrench = draft.wrench(self.joint or self.name.split(".")[1])
+        """The effort of a motor, or of a stop, as part of the joint's wrench."""
+        wrench = draft.wrench(self.joint)
         acts = wrench.torque if self.unit == "rad" else wrench.force
-        if self.along is None:
-            acts[self.axis] += effort
-            return
-        for k, e in enumerate(self.first.axes):
-            acts[k] += effort * dot(e.value, self.along)
+        for k, share in enumerate(self.shares):
+            acts[k] += effort * share
 
     def drive(self, draft: Draft, effort: Expr) -> None:
         """A torque [N.m] or force [N] along it on the second body, and its reaction on the first."""
@@ -174,7 +200,7 @@ class Draft:
 
     def coefficients(self, friction: Any, name: str) -> list[Expr]:
         """One coefficient of friction, or the static and the kinetic one."""
-        given = friction if isinstance(friction, tuple | list) else (friction,)
+        given = several(friction)
         words = ("friction",) if len(given) == 1 else ("static", "kinetic")
         return [
             self.number(mu, f"{name}.{word}", "1", f"coefficient of friction of {name}, {word}")

@@ -18,12 +18,11 @@ from typing import Any, ClassVar
 import numpy as np
 import sympy as sp
 
-from ..model.elements import Contact, Expr, Friction, Holonomic, Nonholonomic, Parameter
+from ..model.elements import Expr, Friction, Holonomic, Nonholonomic, Parameter
 from ..model.model import Model
 from ..model.norms import norm
 from ..model.reactions import multiplier
-from ..names import derivative
-from .body import Marker, Number
+from .body import Marker, Number, several
 from .draft import Draft, Relative, Wrench
 from .guess import Guess, Reach
 from .motion import Placed, Timed, about, between, distance, product
@@ -101,13 +100,19 @@ class Joint:
             if ("about" if axis == 2 else "across") not in self.turns:
                 self.hold(draft, wrench, 2, Timed(b.angle - a.angle, about(a, b, 2), sp.S.Zero))
             return
+        self.hold_turns(draft, a, b, axis, wrench, self.turns)
+
+    def hold_turns(
+        self, draft: Draft, a: Placed, b: Placed, axis: int, wrench: Wrench, free: str
+    ) -> None:
+        """The rows of the rotations, in space, that are not `free`: "about" the axis, "across" it."""
         i, j, k = axis, (axis + 1) % 3, (axis + 2) % 3  # a, b, c: right-handed
-        if "across" not in self.turns:
+        if "across" not in free:
             along = dot(b.axes[i].value, a.axes[i].value)
             self.hold(draft, wrench, k, product(b.axes[i], a.axes[j]), along)
             opposite = product(b.axes[i], a.axes[k])
             self.hold(draft, wrench, j, Timed(*(-x for x in opposite)))
-        if "about" not in self.turns:
+        if "about" not in free:
             along = dot(b.axes[j].value, a.axes[j].value)
             self.hold(draft, wrench, i, product(b.axes[j], a.axes[k]), along)
 
@@ -129,26 +134,13 @@ class Joint:
             turns = name.startswith("angle")
             f = draft.angle(name, a, b, axis) if turns else product(a.axes[axis], between(a, b))
             values = (f.value, f.rate, draft.second(f))
-            unit = "rad" if turns else "m"
-            of = draft.relative[name] = Relative(name, unit, values, a, b, axis)
-            text = f"{name.split('.')[0]} of {self.name}, of its second marker from the first"
-            for order, expression in enumerate(values):
-                called = derivative(name, order)
-                if called not in draft.known:
-                    what = ("", "rate of the ", "second derivative of the ")[order] + text
-                    draft.report(called, expression, of.unit + ("", "/s", "/s^2")[order], what)
-        if self.limits is None:
-            return
-        of = draft.relative[self.measures[0]]
-        acts = wrench.torque if of.unit == "rad" else wrench.force
-        text = f"restitution of {self.name} at its limits"
-        e = draft.number(self.restitution, f"{self.name}.restitution", "1", text)
-        for which, sign, value in zip(("lower", "upper"), (1, -1), self.limits, strict=True):
-            row = f"{self.name}.{which}"
-            stop = draft.number(value, row, of.unit, f"{which} limit of {of.name}")
-            text = f"{of.name} stops at its {which} limit"
-            draft.constraints.append(Contact(row, sign * (of.values[0] - stop), text, e))
-            acts[axis] += sign * multiplier(row)
+            of = Relative(self.name, name, "rad" if turns else "m", values, a, b, axis)
+            kind = name.split(".")[0]
+            of.report(draft, f"{kind} of {self.name}, of its second marker from the first", "the ")
+        if self.limits is not None:
+            text = f"restitution of {self.name} at its limits"
+            e = draft.number(self.restitution, f"{self.name}.restitution", "1", text)
+            draft.relative[self.measures[0]].stop(draft, self.name, self.limits, e)
 
     def rub(self, draft: Draft, axis: int, wrench: Wrench) -> None:
         """Coulomb's law for the motion that it leaves free: |torque| <= mu r N, |force| <= mu N, of a
@@ -181,7 +173,7 @@ class Joint:
     def stick(self, draft: Draft, axis: int, wrench: Wrench) -> None:
         """|torque| or |force| is at most a limit of its own: dry friction of a gear, of a seal."""
         (measure,) = self.measures
-        static, kinetic = (*_pair(self.constant), None)[:2]
+        static, kinetic = (*several(self.constant), None)[:2]
         kind, unit = ("torque", "N.m") if self.turns else ("force", "N")
         name = f"{self.name}.friction_{kind}"
         text = f"friction {kind} of {self.name}"
@@ -440,10 +432,6 @@ def model_number(model: Model, value: Number) -> float:
     """A length as the model has it, in SI."""
     symbol = value.symbol if isinstance(value, Parameter) else value
     return float(sp.sympify(symbol).xreplace({p.symbol: p.value for p in model.parameters}))
-
-
-def _pair(values: Any) -> Sequence[Any]:
-    return values if isinstance(values, tuple | list) else (values,)
 
 
 def name_of_joint(joint: Any) -> str:

@@ -9,7 +9,7 @@ from typing import Any
 import sympy as sp
 
 from .. import names
-from ..model.attitude import ClosedFunction
+from ..model.attitude import written_out
 from ..model.closed_form import in_variables, output
 from ..model.elements import Expr, Parameter
 from ..model.laws import GROUND, Act, Laws, Where
@@ -19,7 +19,7 @@ from .joints import Gear
 from .loads import Force, Rotor, SpringDamper, Torque, Torsion
 from .motion import Placed
 from .space import PAIRS
-from .vectors import AXES, ZERO, dot
+from .vectors import AXES, ZERO
 
 EYE = tuple(sp.Integer(i == j) for i in range(3) for j in range(3))
 STILL = Where(GROUND, ZERO, EYE)
@@ -75,17 +75,10 @@ class _Acting:
 
     def drive(self, of: Relative, effort: Expr, size: Expr = 0) -> None:
         """A torque or force along the motion that a joint leaves free."""
-        along = [effort * share for share in self.shares(of)]
+        along = [effort * in_variables(written_out(share)) for share in of.shares]
         pair = (ZERO, along) if of.unit == "rad" else (along, ZERO)
         force, torque = pair
         self.pair(of.first, of.second, force, torque, size)
-
-    def shares(self, of: Relative) -> list[Expr]:
-        """Components along the axes of the first marker of what an effort of 1 acts along."""
-        if of.along is None:
-            return [sp.Integer(k == of.axis) for k in range(3)]
-        along = [dot(axis.value, of.along) for axis in of.first.axes]
-        return [in_variables(opened(x)) for x in along]
 
     def add(self, part: Any) -> None:
         """What a joint, a load or a contact does; a motor is in the wrench of its joint."""
@@ -151,10 +144,3 @@ class _Acting:
         for node in expression.atoms(sp.core.relational.Relational):
             self.jumps.add(in_variables(node.lhs - node.rhs))
         return in_variables(expression)
-
-
-def opened(expression: Expr) -> Expr:
-    """What is closed written out, in coordinates and speeds."""
-    while closed := expression.atoms(ClosedFunction):
-        expression = expression.xreplace({a: a.opened() for a in closed})
-    return expression

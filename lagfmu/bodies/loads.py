@@ -123,7 +123,8 @@ class Rotor:
         name, of = self.name, draft.motion_of(self.joint)
         unit, text = ("kg.m^2", "inertia") if of.unit == "rad" else ("kg", "mass")
         J = draft.number(self.inertia, f"{name}.inertia", unit, f"{text} of {name}", positive=True)
-        way = dynamicsymbols(f"{name}.rotor.{of.name.split(chr(46))[0]}")
+        kind = of.name.split(".")[0]
+        way = dynamicsymbols(f"{name}.rotor.{kind}")
         draft.curves[way] = Curve(of.unit, J, f"way of {name} from the start")
         draft.kinetic.append(J * way.diff(TIME) ** 2 / 2)
         row = of.values[1] - way.diff(TIME)

@@ -7,7 +7,6 @@ Constraints are rigid here.  The world is the ground, a body without joints a pa
 from __future__ import annotations
 
 import os
-import re
 import warnings
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -26,11 +25,13 @@ from ..model.picture import Box, Rod, Shape, Sphere
 from ..names import RESERVED
 from .body import Body, Ground, Marker
 from .check_mjcf import problems_of_files
+from .inertia import components, together
 from .joints import Fixed, Gear, Joint, Prismatic, Revolute, Spherical
 from .loads import Gravity, Motor, Rotor, Torsion
 from .rotation import onto, turn, turned_by
 from .series import Series
 from .vectors import AXES
+from .words import letters
 
 Array = NDArray[np.float64]
 FREE, BALL, SLIDE, HINGE = range(4)  # MuJoCo's mjtJoint
@@ -40,7 +41,6 @@ SPHERE, CAPSULE, CYLINDER, BOX = 2, 3, 5, 6  # mjtGeom
 NO_GRAVITY = 1 << 7  # mjtDisableBit
 # transmission joint or joint in parent, no dynamics, a fixed gain, no bias or an affine one
 BY_JOINT = {(transmission, 0, 0, bias) for transmission in (0, 1) for bias in (0, 1)}
-PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 SQUARE = 1e-9  # cosine of two axes that are square, and what two points may differ by, relative
 
 
@@ -101,7 +101,7 @@ class _Reader:
         self.data = mujoco.MjData(m)
         self.data.qpos[:] = m.qpos0
         mujoco.mj_kinematics(m, self.data)
-        self.called = word(m.names[: m.names.index(b"\0")].decode() or stem)
+        self.called = letters(m.names[: m.names.index(b"\0")].decode() or stem)
         self.key = self._key(key)
         self.ground = Ground(shape=self._looks(self._with(0)) or None)
         self.roots = [b if m.body_jntnum[b] else 0 for b in range(m.nbody)]
@@ -140,12 +140,15 @@ class _Reader:
 
     def _name(self, kind: str, k: int) -> str:
         """One word of its name in the file, that nothing else has."""
-        plain = word(self._own(kind, k))
-        found = plain if plain not in self.taken | set(RESERVED) else f"{plain}_{kind}"
-        while found in self.taken:
-            found += "_"
-        self.taken.add(found)
-        return found
+        plain = letters(self._own(kind, k))
+        return self._added(plain if plain not in self.taken | set(RESERVED) else f"{plain}_{kind}")
+
+    def _added(self, name: str) -> str:
+        """It, or with as many _ behind it that nothing else has it."""
+        while name in self.taken:
+            name += "_"
+        self.taken.add(name)
+        return name
 
     def _key(self, key: str) -> int:
         known = [self._own("key", k) for k in range(self.m.nkey)]
@@ -173,27 +176,27 @@ class _Reader:
         return self.data.xmat[b].reshape(3, 3).copy(), self.data.xpos[b].copy()
 
     def _body(self, root: int, name: str) -> Body:
-        """Masses, centres and inertias of all that is welded together, by Steiner's theorem."""
+        """What is welded together, as one body."""
         m, (R, origin) = self.m, self._frame(root)
         those = self._with(root)
-        mass = float(sum(m.body_mass[b] for b in those))
-        centers = [R.T @ (self.data.xipos[b] - origin) for b in those]
-        center = sum(m.body_mass[b] * c for b, c in zip(those, centers, strict=True)) / (mass or 1)
-        J = np.zeros((3, 3))
-        for b, c in zip(those, centers, strict=True):
-            axes, d = R.T @ self.data.ximat[b].reshape(3, 3), c - center
-            J += axes @ np.diag(m.body_inertia[b]) @ axes.T
-            J += m.body_mass[b] * (d @ d * np.eye(3) - np.outer(d, d))
+        found = []
+        for b in those:
+            axes, center = (
+                R.T @ self.data.ximat[b].reshape(3, 3),
+                R.T @ (self.data.xipos[b] - origin),
+            )
+            J = axes @ np.diag(m.body_inertia[b]) @ axes.T
+            found.append((float(m.body_mass[b]), center, J))
+        mass, center, J = together(found)
         if not mass > 0 or not np.linalg.eigvalsh(J)[0] > 0:
             self.problems.append(
                 f"body {self._own('body', root)!r} moves and has the mass {mass!r} and the principal moments "
                 f"{np.linalg.eigvalsh(J).tolist()!r}: give it an <inertial>, or a geom with a mass"
             )
-        inertia = tuple(float(J[pair]) for pair in PAIRS)
         own = self._own("body", root)
         description = "" if own == name else f"{own!r} of the file"
         shape = self._looks(those) or None
-        return Body(name, mass, inertia, tuple(map(float, center)), description, shape)
+        return Body(name, mass, components(J), tuple(map(float, center)), description, shape)
 
     def _looks(self, those: Sequence[int]) -> list[Shape]:
         R, origin = self._frame(those[0])
@@ -295,10 +298,7 @@ class _Reader:
             ends = self._marker(parent, frame, first), self._marker(b, turned, second)
             names = [self.joint_names[j] for j in own]
             stops = {self.joint_names[j]: s for j in own if (s := self._limits(j)) is not None}
-            name = self.bodies[b].name + "_joints"
-            while name in self.taken:
-                name += "_"
-            self.taken.add(name)
+            name = self._added(f"{self.bodies[b].name}_joints")
             yield Series(
                 name, *ends, sliding=along, turning=about, names=names, stops=stops, apart=arm
             )
@@ -419,12 +419,6 @@ class _Reader:
             if values[2]:
                 yield Rotor(self._added(f"{name}_rotor"), self._measure(j), values[2])
 
-    def _added(self, name: str) -> str:
-        while name in self.taken:
-            name += "_"
-        self.taken.add(name)
-        return name
-
     def _actuators(self) -> Iterator[Any]:
         """gain u + b0 + b1 (gear q) + b2 (gear q'), times the gear."""
         m = self.m
@@ -512,12 +506,6 @@ class _Reader:
                 LagfmuWarning,
                 stacklevel=4,
             )
-
-
-def word(name: str) -> str:
-    """One word: what is no letter, digit or underscore becomes _, a leading digit gets one before it."""
-    found = re.sub(r"[^A-Za-z0-9_]", "_", name) or "_"
-    return f"_{found}" if found[0].isdigit() else found
 
 
 def _square(axes: Array) -> Array:

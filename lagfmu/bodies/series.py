@@ -20,9 +20,8 @@ from typing import ClassVar
 import numpy as np
 import sympy as sp
 
-from ..model.elements import Contact, Expr
+from ..model.elements import Expr
 from ..model.reactions import multiplier
-from ..names import derivative
 from .body import Number
 from .draft import Draft, Relative, Wrench
 from .guess import Guess, Pose, Reach
@@ -90,7 +89,8 @@ class Series(Joint):
             for k, e in enumerate(a.axes):
                 wrench.torque[k] += dot(e.value, torque)
         elif len(self.turning) < 2:
-            self._straight(draft, a, b, wrench)
+            along, free = AXES.index(self.turning or "z"), "about" if self.turning else ""
+            self.hold_turns(draft, a, b, along, wrench, free)
 
     def _arm(self, draft: Draft) -> Expr:
         text = f"distance of the hinges of {self.name}"
@@ -119,17 +119,6 @@ class Series(Joint):
             force = plus(force, times(f, e.value))
         return times(-arm, cross(v.value, cross(force, u.value)))
 
-    def _straight(self, draft: Draft, a: Placed, b: Placed, wrench: Wrench) -> None:
-        """The rows of a hinge, or those of none."""
-        i = AXES.index(self.turning or "z")
-        j, k = (i + 1) % 3, (i + 2) % 3
-        along = dot(b.axes[i].value, a.axes[i].value)
-        self.hold(draft, wrench, k, product(b.axes[i], a.axes[j]), along)
-        self.hold(draft, wrench, j, Timed(*(-x for x in product(b.axes[i], a.axes[k]))))
-        if not self.turning:
-            along = dot(b.axes[j].value, a.axes[j].value)
-            self.hold(draft, wrench, i, product(b.axes[j], a.axes[k]), along)
-
     def coordinate(self, draft: Draft, a: Placed, b: Placed, axis: int, wrench: Wrench) -> None:
         """The motions that it leaves free, with their limits."""
         slides = [
@@ -141,25 +130,11 @@ class Series(Joint):
             turns = name.startswith("angle")
             f = draft.turning(name, f) if turns else f
             values, unit = (f.value, f.rate, draft.second(f)), "rad" if turns else "m"
-            of = Relative(name, unit, values, a, b, k, direction, self.name)
-            draft.relative[name] = of
-            for order, expression in enumerate(values):
-                called = derivative(name, order)
-                if called not in draft.known:
-                    what = ("", "rate of ", "second derivative of ")[order] + name
-                    draft.report(called, expression, unit + ("", "/s", "/s^2")[order], what)
-            self._stop(draft, of)
-
-    def _stop(self, draft: Draft, of: Relative) -> None:
-        name = of.name.split(".")[1]
-        for which, sign, value in zip(
-            ("lower", "upper"), (1, -1), self.stops.get(name, ()), strict=False
-        ):
-            row = f"{name}.{which}"
-            stop = draft.number(value, row, of.unit, f"{which} limit of {of.name}")
-            text = f"{of.name} stops at its {which} limit"
-            draft.constraints.append(Contact(row, sign * (of.values[0] - stop), text, sp.S.Zero))
-            of.transmit(draft, sign * multiplier(row))
+            of = Relative(self.name, name, unit, values, a, b, k, direction)
+            of.report(draft, name)
+            own = name.split(".")[1]
+            if own in self.stops:
+                of.stop(draft, own, self.stops[own], sp.S.Zero)
 
     def _angles(self, a: Placed, b: Placed) -> list[tuple[int, Timed, Vector | None]]:
         """The axis of each hinge, its angle within a turn with its rate, and along what a torque works."""

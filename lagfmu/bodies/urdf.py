@@ -23,6 +23,7 @@ from ..errors import LagfmuWarning, ModelError
 from ..model.picture import Box, Rod, Shape, Sphere
 from .body import Body, Ground, Marker
 from .check_urdf import number_of_dynamics, problems_of_parts, problems_of_text, problems_of_tree
+from .inertia import components, together
 from .joints import Fixed, Gear, Joint, Planar, Prismatic, Revolute
 from .loads import Torsion
 from .rotation import onto, quaternion
@@ -37,7 +38,6 @@ KINDS: dict[str, Any] = {
     "floating": None,  # leaves its child free
 }
 BASES = ("fixed", "floating")
-PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # xx, yy, zz, xy, xz, yz
 UP = np.array([0.0, 0.0, 1.0])
 Pose = NDArray[np.float64]  # (4, 4) homogeneous
 
@@ -165,7 +165,7 @@ class _Builder:
             if name == self.root and not self.floating:
                 found[name] = Ground(shape=shapes)
                 continue
-            mass, center, J = _together(parts)
+            mass, center, J = together([*_inertias(parts)])
             if not mass > 0 or not (np.diag(J) > 0).all():
                 what = "mass" if not mass > 0 else "inertia"
                 self.problems.append(
@@ -173,11 +173,10 @@ class _Builder:
                     "a fixed joint to a link that has one"
                     + ("; or leave base='floating' out" if name == self.root else "")
                 )
-            inertia = tuple(float(J[pair]) for pair in PAIRS)
             word = self.words.links.get(name, name)
             told = f"link {name!r} of the file" if word != name else ""
             found[name] = Body(
-                word, mass, inertia, tuple(map(float, center)), description=told, shape=shapes
+                word, mass, components(J), tuple(map(float, center)), description=told, shape=shapes
             )
         return found
 
@@ -297,28 +296,12 @@ def _along_tree(robot: Any, root: str) -> Iterator[Any]:
         yield joint
 
 
-def _together(parts: list[tuple[Any, Pose]]) -> tuple[float, Pose, Pose]:
-    """Mass [kg], centre [m] and inertia about it (3, 3) of links at poses in one frame (Steiner)."""
-    found = []
+def _inertias(parts: list[tuple[Any, Pose]]) -> Iterator[tuple[float, Pose, Pose]]:
+    """Mass [kg], centre [m] and inertia about it (3, 3) of links at poses, in one frame."""
     for link, pose in parts:
         if link.inertial is not None:
             R, own = pose[:3, :3], _pose(link.inertial.origin)[:3, 3]
-            found.append((_mass(link), pose[:3, 3] + R @ own, R @ _tensor(link) @ R.T))
-    if len(found) == 1:
-        return found[0]
-    mass = sum(m for m, _, _ in found)
-    if not mass > 0:
-        return 0.0, np.zeros(3), sum((J for _, _, J in found), np.zeros((3, 3)))
-    center = sum((m * c for m, c, _ in found), np.zeros(3)) / mass
-    arms = [c - center for _, c, _ in found]
-    J = sum(
-        (
-            J + m * (d @ d * np.eye(3) - np.outer(d, d))
-            for (m, _, J), d in zip(found, arms, strict=True)
-        ),
-        np.zeros((3, 3)),
-    )
-    return mass, center, J
+            yield _mass(link), pose[:3, 3] + R @ own, R @ _tensor(link) @ R.T
 
 
 def _pose(origin: Any) -> Pose:

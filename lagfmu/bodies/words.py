@@ -9,11 +9,15 @@ from dataclasses import dataclass
 from ..names import RESERVED
 
 
-def word(name: str) -> str:
-    """What is no letter, digit or underscore becomes _; a leading digit gets one before it, what the FMU or
-    the mechanism reserves one behind it."""
+def letters(name: str) -> str:
+    """What is no letter, digit or underscore becomes _; a leading digit gets one before it."""
     made = re.sub(r"[^A-Za-z0-9_]", "_", name) or "_"
-    made = f"_{made}" if made[0].isdigit() else made
+    return f"_{made}" if made[0].isdigit() else made
+
+
+def word(name: str) -> str:
+    """Its letters; what the FMU or the mechanism reserves gets a _ behind it."""
+    made = letters(name)
     return f"{made}_" if made in RESERVED or made == "ground" else made
 
 
