@@ -122,17 +122,22 @@ class Single(Caller):
 
     # ------------------------------------------------------------------ whole steps of a life
 
-    def start(
+    def initializing(
         self,
         values: dict[str, float] | None = None,
         tolerance: float = 1e-10,
         stop: float | None = None,
     ) -> Single:
-        """Initialized, `values` set before; of co-simulation in Step Mode."""
+        """`values` set, and in Initialization Mode."""
         for name, value in (values or {}).items():
             self.set(name, value)
         end = c_bool(stop is not None), c_double(stop or 0.0)
         self.does("EnterInitializationMode", c_bool(True), c_double(tolerance), c_double(0), *end)
+        return self
+
+    def start(self, *arguments: Any, **named: Any) -> Single:
+        """The same, and initialized; of co-simulation in Step Mode."""
+        self.initializing(*arguments, **named)
         self.does("ExitInitializationMode")
         return self
 

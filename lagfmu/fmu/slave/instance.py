@@ -19,6 +19,8 @@ from ...numeric.start_priority import GIVEN, OMITTED, SET, left_out
 from ...numeric.thresholds import SMALLEST_TOLERANCE
 from ...numeric.tolerance import tolerance_problem
 from ...solver.advance import advance, looked_at
+from ...solver.crossing import check_crossing
+from ...solver.equations import Motion
 from ...solver.observe import observe
 from ...solver.state import Event, Settings, State, restored, restored_settings
 from .rates import Past, estimated, half_connected
@@ -250,6 +252,7 @@ class Instance:
             heights=heights,
             extents=extents,
         )
+        check_crossing(Motion(self.system, u, self.p, self.start_time), self.settings, self.state)
         self.foreseen, self.seen = u, None
         return self.state
 

@@ -1,0 +1,94 @@
+"""A start next to a crossing of two branches of the motion, where the rows depend on each other.
+
+G v = nu holds to rounding, so that speeds are known to eps / s in the direction that the rows tell least, s
+being the smallest singular value of the scaled rows.  gamma is of second order in them, and lambda is gamma
+over s^2: off by eps / s^3, which may be all of it, unless the speeds are those of one branch to the last.
+Nothing at the start tells which; the motion a little further along the branch does.  In the crossing itself a
+row is missing that holds the first step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ..numeric.failure import StartFailureError, StepFailureError
+from ..numeric.system import Vector
+from .equations import Motion
+from .linear import Rows
+from .projection import project_positions, project_velocities
+from .state import Settings, State
+
+NEAR = 1e-2  # singular value of the scaled rows below which a crossing may be near
+BESIDE = 3e-3  # of the motion's size: how far along the branch lambda is looked at
+OPENS = 2  # times as large is the singular value there, where it is small at a crossing only
+LOST = 1e-3  # of the forces at work: lambda that differs by more has lost its digits
+
+
+class Place(NamedTuple):
+    """Accelerations (nv), multipliers (m) and decomposed rows at a state on the constraints."""
+
+    vdot: Vector
+    lam: Vector
+    rows: Rows
+
+    def apart(self, rank: int) -> float:
+        """The smallest singular value, as many rows being independent."""
+        return float(self.rows.S[rank - 1])
+
+
+def check_crossing(motion: Motion, settings: Settings, state: State) -> None:
+    """Raises StartFailureError if the start lies next to a crossing, and lambda has no digits there."""
+    acting, system = motion.system.active(state.closed), motion.system
+    if len(acting) < 2:
+        return
+    q, v, t = np.array(state.q), np.array(state.v), state.t
+    terms = motion.terms(t, q, v)
+    mass, span = np.abs(terms.M.diagonal()), np.array(settings.span)
+    way, pace = np.sqrt(mass @ span**2), np.sqrt(mass @ v**2)
+    if not (way > 0 and pace > 0):
+        return
+
+    def along(sizes: float) -> Place:
+        rate = motion.rate(t, q, v) * (sizes * way / pace)
+        there = project_positions(motion, t, q + rate, v, acting, span)
+        w = project_velocities(motion.terms(t, there, v).of(acting), v)
+        return Place(*motion.accelerations(motion.terms(t, there, w).of(acting)))
+
+    here = Place(*motion.accelerations(terms.of(acting)))
+    try:
+        ahead, behind = along(BESIDE), along(-BESIDE)
+        rank = max(ahead.rows.rank, behind.rows.rank)
+        sign = 1 if ahead.apart(rank) > behind.apart(rank) else -1
+        near = ahead if sign > 0 else behind
+        if not here.apart(rank) < min(NEAR, near.apart(rank) / OPENS):
+            return
+        beside = [near, *(along(sign * k * BESIDE) for k in (2, 3))]
+        lost = here.rows.rank < rank or _differs(here, beside, terms.F)
+    except StepFailureError:
+        rank, lost = here.rows.rank, here.apart(here.rows.rank) < NEAR
+    if lost:
+        weakest = np.abs(here.rows.U[:, rank - 1])
+        names = [system.rows[k].name for k, x in zip(acting, weakest, strict=True) if x > 0.1]
+        raise StartFailureError(
+            "the start is refused: next to these start values the configuration is singular: the constraints "
+            f"{', '.join(map(repr, names))} depend on each other, another branch of the motion begins, and "
+            "multipliers have lost their digits (the smallest singular value of the scaled rows is "
+            f"{here.apart(rank):.3g}, {NEAR} is enough): start further beside it, or give the speeds of one "
+            "branch"
+        )
+
+
+def _differs(here: Place, beside: Sequence[Place], F: Vector) -> bool:
+    """Are accelerations or multipliers others than those which the parabola through three places beside says?
+
+    Forces count in the metric of 1/M, accelerations in that of M: M is diag(1 / D^2) there.
+    """
+    D, length = here.rows.D, here.rows.length
+    largest = float(np.abs(np.append(beside[0].lam * length, F * D)).max())
+    weights = 3.0, -3.0, 1.0
+    vdot = here.vdot - sum(w * p.vdot for w, p in zip(weights, beside, strict=True))
+    lam = here.lam - sum(w * p.lam for w, p in zip(weights, beside, strict=True))
+    return bool(np.abs(np.append(vdot / D, lam * length)).max() > LOST * largest)
