@@ -24,6 +24,7 @@ from .state import Settings, State
 NEAR = 1e-2  # singular value of the scaled rows below which a crossing may be near
 BESIDE = 3e-3  # of the motion's size: how far along the branch lambda is looked at
 OPENS = 2  # times as large is the singular value there, where it is small at a crossing only
+POLYNOMIAL = 5.0, -10.0, 10.0, -5.0, 1.0  # through so many places: what it is at the start
 LOST = 1e-3  # of the forces at work: lambda that differs by more has lost its digits
 
 
@@ -65,8 +66,8 @@ def check_crossing(motion: Motion, settings: Settings, state: State) -> None:
         near = ahead if sign > 0 else behind
         if not here.apart(rank) < min(NEAR, near.apart(rank) / OPENS):
             return
-        beside = [near, *(along(sign * k * BESIDE) for k in (2, 3))]
-        lost = here.rows.rank < rank or _differs(here, beside, terms.F)
+        beside = [near, *(along(sign * k * BESIDE) for k in range(2, 6))]
+        lost = here.rows.rank < rank or _differs(here, beside, rank, terms.F)
     except StepFailureError:
         rank, lost = here.rows.rank, here.apart(here.rows.rank) < NEAR
     if lost:
@@ -81,14 +82,21 @@ def check_crossing(motion: Motion, settings: Settings, state: State) -> None:
         )
 
 
-def _differs(here: Place, beside: Sequence[Place], F: Vector) -> bool:
-    """Are accelerations or multipliers others than those which the parabola through three places beside says?
+def _differs(here: Place, beside: Sequence[Place], rank: int, F: Vector) -> bool:
+    """Are accelerations or multipliers others than those which a polynomial through the places beside says?
 
-    Forces count in the metric of 1/M, accelerations in that of M: M is diag(1 / D^2) there.
+    Multipliers are smooth along a branch; where something pushes out of it, which they hold by 1 / s of it,
+    they are so times s.  Forces count in the metric of 1/M, accelerations in that of M, diag(1 / D^2).
     """
-    D, length = here.rows.D, here.rows.length
-    largest = float(np.abs(np.append(beside[0].lam * length, F * D)).max())
-    weights = 3.0, -3.0, 1.0
-    vdot = here.vdot - sum(w * p.vdot for w, p in zip(weights, beside, strict=True))
-    lam = here.lam - sum(w * p.lam for w, p in zip(weights, beside, strict=True))
-    return bool(np.abs(np.append(vdot / D, lam * length)).max() > LOST * largest)
+    D, length, s = here.rows.D, here.rows.length, here.apart(rank)
+    forces = np.concatenate([beside[0].lam * length, here.lam * length, F * D])
+    most = LOST * float(np.abs(forces).max())
+    places = list(zip(POLYNOMIAL, beside, strict=True))
+    vdot = here.vdot - sum(w * p.vdot for w, p in places)
+    lam = here.lam - sum(w * p.lam for w, p in places)
+    pushed = here.lam - sum(w * p.lam * p.apart(rank) for w, p in places) / s
+    return _largest(vdot / D) > most or min(_largest(x * length) for x in (lam, pushed)) > most
+
+
+def _largest(x: Vector) -> float:
+    return float(np.abs(x).max())

@@ -56,7 +56,9 @@ def optional_source(
     rows += ["    .events_find = events_find,\n"] if system.is_watched else []
     rows += [f"    .{name} = {name},\n" for name in AT_CONTACTS if contacts]
     rows += ["    .switches = &SWITCHES,\n"] if system.switches else []
-    rows += ["    .passage = &PASSAGE,\n"] if _may_pass(system) else []
+    if _may_cross(system):
+        rows.append("    .crossing_begins = crossing_begins,\n")
+        rows += ["    .passage = &PASSAGE,\n"] if not system.frictions else []
     rows += ["    .friction = &FRICTION_EVENTS,\n"] if system.frictions else []
     rows += ["    .variation = &VARIATION,\n"] if scene.sensitivities else []
     if scene.sensitivities and system.frictions:
@@ -96,9 +98,9 @@ def needs_tangents(scene: Scene, system: System) -> bool:
     return scene.differentiable or "radau5" in scene.integrators
 
 
-def _may_pass(system: System) -> bool:
-    """True if constraints may depend on each other for an instant; with frictions it is not looked for."""
-    return len(system.rows) > 1 and not system.frictions
+def _may_cross(system: System) -> bool:
+    """True if constraints may depend on each other for an instant."""
+    return len(system.rows) > 1
 
 
 def _moves(system: System) -> bool:

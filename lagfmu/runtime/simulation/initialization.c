@@ -275,8 +275,8 @@ Status solver_start(Solver *s, double t, const double *q0, const double *v0, con
     nominals_watch(s, x.at, s->state.q);
     nominals_gaps(s, x.at, s->state.q);
     if (find_nominals(&x) == FAILED) return FAILED;
-    if (OPTIONAL.passage != NULL && s->state.now.rate > 0) {
-        if (OPTIONAL.passage->begins(s) != OK) return initial_refused(s);
+    if (OPTIONAL.crossing_begins != NULL && s->state.now.rate > 0) {
+        if (OPTIONAL.crossing_begins(s) != OK) return initial_refused(s);
         if (mechanism_motion(&s->stepped, x.at, s->state.q, s->state.v, s->active) != OK) return initial_refused(s);
     }
     if (moved != NULL) initial_moved(&x, moved, context);

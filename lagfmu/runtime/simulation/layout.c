@@ -68,7 +68,8 @@ void solver_layout(Solver *s, Arena *saved, Arena *scratch, const System *system
     s->iwork_initial = arena_ints(scratch, 2 * m + contacts);
     s->work_contacts = arena_doubles(scratch, 2 * nv + 3 * m);
     s->iwork_contacts = arena_ints(scratch, m + 2 * contacts);
-    s->work_passage = arena_doubles(scratch, OPTIONAL.passage != NULL ? width + m + 3 * nv : 0);
+    s->work_passage = arena_doubles(scratch, OPTIONAL.passage != NULL ? width : 0);
+    s->work_crossing = arena_doubles(scratch, OPTIONAL.crossing_begins != NULL ? width + 2 * m + 3 * nv : 0);
     s->work_advance = arena_doubles(scratch, 2 * width);
     s->work_pause = arena_doubles(scratch, width);
     s->work_events = arena_doubles(scratch, 3 * width + indicators +

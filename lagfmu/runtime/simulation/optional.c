@@ -20,6 +20,7 @@ SHARED_VALUE const Optional OPTIONAL = {
     .modes_departures = modes_departures,
     .modes_contradicted = modes_contradicted,
     .switches = &SWITCHES,
+    .crossing_begins = crossing_begins,
     .passage = &PASSAGE,
     .friction = &FRICTION_EVENTS,
     .variation = &VARIATION,

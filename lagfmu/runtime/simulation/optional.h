@@ -6,6 +6,7 @@
 #define LAGFMU_OPTIONAL_H
 
 #include "contacts.h"
+#include "crossing.h"
 #include "events.h"
 #include "joint_start.h"
 #include "impact.h"
@@ -37,7 +38,8 @@ typedef struct {
     Status (*modes_contradicted)(Solver *s);
     /* Of forces that jump; NULL where none do. */
     const Switches *switches;
-    /* Of singular configurations; NULL with less than two constraints, or with frictions. */
+    /* Of singular configurations: at the start, NULL with less than two constraints; passed through, or with frictions. */
+    Status (*crossing_begins)(Solver *s);
     const Passage *passage;
     /* What constraints that hold by friction need; NULL where there are none. */
     const FrictionEvents *friction;

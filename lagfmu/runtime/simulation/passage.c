@@ -19,6 +19,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "crossing.h"
 #include "digits.h"
 #include "extreme.h"
 #include "segment.h"
@@ -36,25 +37,6 @@ static const double LOOK_AHEAD = 1e-4; /* natural times, in which it is seen how
 static const double LANDED = 1e-3;    /* angle below which a step ended in a crossing, from which none begins */
 static const double PLACED = 1e-9;   /* of a step: how well the time of a passage is found */
 static const double BESIDE = 1e-3;   /* of a step: how far beside it all rows are looked at */
-static const double START_NEAR = 1e-2;   /* angle below which a start may be too near a crossing: ... */
-static const double START_BESIDE = 1e-2; /* sizes: so far beside it the motion is looked at, ... */
-enum { BESIDES = 3 };
-static const double PARABOLA[BESIDES] = {3, -3, 1}; /* through so many places says what is at the start */
-static const double OPENS = 2;           /* if the angle is so many times as wide there; ... */
-static const double FORCES_LOST = 1e-3;  /* of the forces at work: by how much multipliers may differ */
-static const double NAMING = 1e-5;   /* how far off the constraints a state is taken to be that the rows are
-                                      * named at: linear_rank_threshold() */
-
-/* Factors the rows that stages are evaluated by, at (t, y), taken to be off the constraints by that much. */
-static Status factor_there(Solver *s, double t, const double *y, double off) {
-    Mechanism *b = &s->stepped;
-    if (mechanism_evaluate(b, segment_instant(s, t), y, y + s->system->nq) != OK) return FAILED;
-    b->linear.off = off;
-    const Status status = linear_factor(&b->linear, b->M, b->G, solver_rows(s));
-    b->linear.off = 0;
-    return status;
-}
-
 /* How fast the angle falls [1/s] at the state where a step begins; y is left to the scratch. */
 static double falling(Solver *s, double t, const double *y, double apart) {
     const int nq = s->system->nq;
@@ -65,7 +47,7 @@ static double falling(Solver *s, double t, const double *y, double apart) {
     mechanism_rates(b, y + nq, there);
     for (int j = 0; j < nq; j++) there[j] = y[j] + ahead * there[j];
     memcpy(there + nq, y + nq, (size_t)s->system->nv * sizeof *y);
-    if (factor_there(s, t + ahead, there, DBL_MIN) != OK) return 0;
+    if (crossing_factor(s, t + ahead, there, DBL_MIN) != OK) return 0;
     return (apart - linear_apart(&s->stepped.linear)) / ahead;
 }
 
@@ -85,7 +67,7 @@ static void look(Solver *s, double t, const double *y) {
     const double h = t - x->t, before = x->apart;
     if (!(h > 0) && before != APART_UNKNOWN) return;
     const int known = s->stepped.linear.active == solver_rows(s); /* the factors are those of the rows of the step */
-    if (dependent && !known && factor_there(s, t, y, DBL_MIN) != OK) return;
+    if (dependent && !known && crossing_factor(s, t, y, DBL_MIN) != OK) return;
     const double apart = linear_apart(&s->stepped.linear);
     *x = (Approach){t, apart, -1, 0};
     if (!(apart < NARROW)) return;
@@ -124,20 +106,9 @@ static Status height_of_rows(void *context, double elapsed, double *value) {
     Solver *s = context;
     const Integrator *i = &s->integrator;
     i->method->dense(i, i->t_old + elapsed, s->work_passage);
-    if (factor_there(s, i->t_old + elapsed, s->work_passage, DBL_MIN) != OK) return FAILED;
+    if (crossing_factor(s, i->t_old + elapsed, s->work_passage, DBL_MIN) != OK) return FAILED;
     *value = -linear_apart(&s->stepped.linear);
     return OK;
-}
-
-/* Appends the rows that depend on each other, and how many they are. */
-static int name_rows(Solver *s, Why *text) {
-    int count = 0;
-    for (int k = 0; k < s->system->m; k++) {
-        if (s->stepped.linear.unique[k]) continue;
-        why_append(text, "%s'%s'", count > 0 ? ", " : "", s->system->rows[k].name);
-        count += 1;
-    }
-    return count;
 }
 
 /* Unless it is only the rows of the step that stand for all which depend on each other there. */
@@ -150,8 +121,8 @@ static Status tell(Solver *s, double t) {
         if (!all_narrow(s, beside, s->work_passage, 0)) return OK;
     }
     i->method->dense(i, t, s->work_passage);
-    if (factor_there(s, t, s->work_passage, NAMING) != OK) return FAILED;
-    if (name_rows(s, &rows) == 0) return OK;
+    if (crossing_factor(s, t, s->work_passage, CROSSING_NAMING) != OK) return FAILED;
+    if (crossing_name_rows(s, &rows) == 0) return OK;
     why_append(&s->passed, "%sat t = %.9g s the motion passes, smoothly, a singular configuration: the constraints %s "
                            "depend on each other there, another branch begins, and next to it lambda and the "
                            "accelerations lose digits",
@@ -186,95 +157,11 @@ static void explain(Solver *s) {
     const Integrator *i = &s->integrator;
     const Why cause = s->why;
     Why rows = {""};
-    const int named = factor_there(s, i->t, i->y, NAMING) == OK && name_rows(s, &rows) > 0;
+    const int named = crossing_factor(s, i->t, i->y, CROSSING_NAMING) == OK && crossing_name_rows(s, &rows) > 0;
     s->why = cause;
     if (named)
         why_append(&s->why, " (next to t = %s s the constraints %s depend on each other: the configuration is singular)",
                    digits(i->t).text, rows.text);
 }
 
-/* How far apart as many rows are as are independent; < 0: it is not known. */
-static double rows_apart(Solver *s, double t, const double *y) {
-    Mechanism *b = &s->stepped;
-    if (!s->state.now.dependent) return factor_there(s, t, y, DBL_MIN) == OK ? linear_apart(&b->linear) : -1;
-    if (mechanism_motion(b, segment_instant(s, t), y, y + s->system->nq, s->active) != OK) return -1;
-    return linear_furthest_apart(&b->linear);
-}
-
-/* y (states) <- as the motion would be had it gone on, at the same t, by so many sizes of what it moves through. */
-static Status go_beside(Solver *s, double t, double sizes, double *y) {
-    const int nq = s->system->nq;
-    Mechanism *b = &s->stepped;
-    double *rate = s->work_passage, fastest = 0;
-    for (int i = 0; i < s->system->nv; i++) {
-        const int dimension = s->system->speed_dimension[i];
-        const double span = dimension == s->system->angles ? 1 : mechanism_largest_alike(s->system, dimension, s->state.span);
-        if (span > 0) fastest = fmax(fastest, fabs(s->state.v[i]) / span);
-    }
-    state_gather(s->system, s->state.q, s->state.v, y);
-    if (!(fastest > 0)) return OK; /* nothing moves */
-    mechanism_kinematics(b, segment_instant(s, t), y);
-    mechanism_rates(b, y + nq, rate);
-    for (int j = 0; j < nq; j++) y[j] += sizes / fastest * rate[j];
-    return segment_project(s, t, y);
-}
-
-/* Adds part times the multipliers (m) and accelerations (nv) of the motion at `sizes` from the start. */
-static Status add_motion(Solver *s, double t, double sizes, double part, double *lambda, double *vdot) {
-    double *y = s->work_advance;
-    Mechanism *b = &s->stepped;
-    if (go_beside(s, t, sizes, y) != OK) return FAILED;
-    if (mechanism_motion(b, segment_instant(s, t), y, y + s->system->nq, s->active) != OK) return FAILED;
-    for (int k = 0; k < s->system->m; k++) lambda[k] += part * b->lambda[k];
-    for (int i = 0; i < s->system->nv; i++) vdot[i] += part * b->vdot[i];
-    return OK;
-}
-
-/* What a parabola through the motion beside says of the multipliers and accelerations at the start, less what they are: is that more than
- * a part of the forces at work there? */
-static int lost(Solver *s, double t, double sizes) {
-    const System *x = s->system;
-    Mechanism *b = &s->stepped;
-    double *lambda = s->work_passage + solver_width(s), *vdot = lambda + x->m, *forces = vdot + x->nv, *reach = forces + x->nv;
-    memset(lambda, 0, (size_t)(x->m + x->nv) * sizeof *lambda);
-    for (int i = BESIDES - 1; i >= 0; i--) /* the nearest last: forces are those there */
-        if (add_motion(s, t, (i + 1) * sizes, PARABOLA[i], lambda, vdot) != OK) return 1;
-    mechanism_at_work(b, forces, reach);
-    if (add_motion(s, t, 0, -1, lambda, vdot) != OK) return 1;
-    for (int i = 0; i < x->nv; i++)
-        if (fabs(vdot[i]) > FORCES_LOST * mechanism_largest_alike(x, x->speed_dimension[i], reach)) return 1;
-    for (int k = 0; k < x->m; k++) {
-        if (!b->linear.unique[k]) continue;
-        for (int e = x->row_start[k]; e < x->row_start[k + 1]; e++) {
-            const int dimension = x->speed_dimension[x->entry_column[e]];
-            if (fabs(b->G[e] * lambda[k]) > FORCES_LOST * mechanism_largest_alike(x, dimension, forces)) return 1;
-        }
-    }
-    return 0;
-}
-
-/* Speeds that were completed are known there to eps / apart, and multipliers, which are what is left of their squares, to
- * eps / apart^3; those that were given on one branch may be right all the same.  What the motion is beside tells. */
-static Status begins(Solver *s) {
-    const double t = s->state.now.t;
-    double *y = s->work_advance, ahead, behind;
-    Why rows = {""};
-    state_gather(s->system, s->state.q, s->state.v, y);
-    const double apart = rows_apart(s, t, y);
-    if (!(apart >= 0 && apart < START_NEAR)) return OK;
-    ahead = go_beside(s, t, START_BESIDE, y) == OK ? rows_apart(s, t, y) : -1;
-    behind = go_beside(s, t, -START_BESIDE, y) == OK ? rows_apart(s, t, y) : -1;
-    if (ahead >= 0 && behind >= 0 && !(fmax(ahead, behind) > OPENS * apart)) return OK; /* they stay as they are */
-    if (!lost(s, t, behind > ahead ? -START_BESIDE : START_BESIDE)) return OK;
-    s->why = (Why){""};
-    state_gather(s->system, s->state.q, s->state.v, y);
-    if (factor_there(s, t, y, NAMING) != OK) return FAILED;
-    (void)name_rows(s, &rows);
-    return fail(&s->why,
-                "next to these start values the configuration is singular: the constraints %s depend on each other, "
-                "another branch of the motion begins, and multipliers have lost their digits (the sine of the angle "
-                "between the rows is %.3g, 0.01 is enough): start further beside it, or give the speeds of one branch",
-                rows.text, apart);
-}
-
-SHARED_VALUE const Passage PASSAGE = {look, longest, stage, suspected, landed, find_passage, begins, explain};
+SHARED_VALUE const Passage PASSAGE = {look, longest, stage, suspected, landed, find_passage, explain};

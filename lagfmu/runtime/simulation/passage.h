@@ -20,8 +20,6 @@ typedef struct {
     int (*landed)(const Solver *s, double *h);
     /* The step just taken, whose dense output is there: a passage in it is told in s->passed. */
     Status (*find)(Solver *s);
-    /* FAILED, with why: the start lies in such a configuration, or too near for multipliers to have digits. */
-    Status (*begins)(Solver *s);
     /* Appends to s->why which rows nearly depend on each other where the integrator stands. */
     void (*explain)(Solver *s);
 } Passage;

@@ -78,6 +78,7 @@ typedef struct Solver {
     double *work_switches;     /* (2 switches + states + nq) of switches.c */
     double apart, narrowest;   /* linear_apart() at the latest stage, and the least of a step */
     double *work_passage;      /* (solver_width()) of passage.c */
+    double *work_crossing;     /* (solver_width() + 2 m + 3 nv) of crossing.c */
     double *work_advance;      /* (2 solver_width()) of advance.c and exchange.c */
     double *work_pause;        /* (solver_width()) */
     double *work_events;       /* (3 solver_width() + indicators and all samples) of events.c and exchange_gain.c */
