@@ -265,6 +265,40 @@ def test_a_bouncing_ball_after_several_impacts(varied):
     assert abs(found["sensitivity.energy.total.by.e"] - g * h * 2 * n * e ** (2 * n - 1)) < 1e-9
 
 
+def test_a_ball_that_has_all_but_come_to_rest(built):
+    """From rest h above a floor at z = b, restitution e: impact n comes after T = sqrt(2 h/g) (1 + 2 (e +
+    ... + e^(n-1))), dT/db = -T/(2 h), with the impulse (1 + e) e^(n-1) m sqrt(2 g h).  At the 29th it falls
+    with 1e-4 m/s, of which differences at heights of 1 m know four digits."""
+    z = dynamicsymbols("z")
+    m, g, b, e = symbols("m g b e", positive=True)
+    model = Model(
+        name="Tired",
+        lagrangian=m * z.diff() ** 2 / 2 - m * g * z,
+        coordinates={z: "m"},
+        constraints=[Contact("floor", z - b, restitution=e)],
+        parameters=[
+            Parameter(m, 1.0, "kg"),
+            Parameter(g, 2.0, "m/s^2"),
+            Parameter(b, 1.0, "m"),
+            Parameter(e, 0.7, "1"),
+        ],
+        start={z: 2.0},
+    )
+    fmu = built(model, Scene("Tired", sensitivities=("closing.floor.*:e,b,z",)))
+    for n in (10, 20, 29):
+        time = 1 + 2 * sum(0.7**k for k in range(1, n))
+        found = run(fmu, time + 0.7**n, 1)[-1]
+        slope = 2 * sum(k * 0.7 ** (k - 1) for k in range(1, n))
+        blow = 1.7 * 0.7 ** (n - 1)
+        by_e = 2 * (0.7 ** (n - 1) + 1.7 * (n - 1) * 0.7 ** (n - 2))
+        assert found["closing.floor.count"] == n
+        for name, right in {"e": slope, "b": -time / 2, "z": time / 2}.items():
+            assert found[f"sensitivity.closing.floor.time.by.{name}"] == pytest.approx(right, 1e-9)
+        for name, right in {"e": by_e, "b": -blow, "z": blow}.items():
+            mine = found[f"sensitivity.closing.floor.impulse.by.{name}"]
+            assert mine == pytest.approx(right, 1e-7), (n, name)
+
+
 def test_half_a_car_that_leaves_its_road(varied, built):
     """Two departures and two landings on a tabulated road: as central differences of tight runs, at the
     events and after them."""
@@ -406,13 +440,96 @@ def test_two_contacts_that_are_met_at_one_instant(built):
         assert one.get("sensitivity.x.by.v") == 0
         told = [text for _, _, text in one.log if "sensitivity" in text]
     assert len(told) == 1
-    assert "'floor'" in told[0]
-    assert "of v it goes another way" in told[0]
+    assert "contact 'floor', contact 'wall'" in told[0]
+    assert "with another v they would not come at one instant" in told[0]
     assert run(fmu, 1.4, 2, {"v": 0.9})["sensitivity.valid"].all()  # there the floor comes first
     slower = run(fmu, 1.1, 11, {"v": 0.99})
     found = fit(fmu, {name: np.array(slower[name]) for name in ("time", "x")}, {"v": (0.97, 1.1)})
     assert abs(found.values["v"] - 0.99) < 1e-6
     assert any("derivatives of the FMU end within a run" in text for text in found.remarks())
+
+
+def in_the_corner(v: complex, b: complex, until: float, slope: float = 0.2) -> list[complex]:
+    """x, z, x', z' of the ball of thrown() from (0, 0.8): one parabola after another."""
+    x, z, vx, vz, left = 0j, 0.8 + 0j, v, 0j, until + 0j
+    for _ in range(4):
+        half = (vz + slope * vx) / 2
+        floor = half + (half**2 + z + slope * x) ** 0.5
+        wall = (b - x) / vx if vx.real > 0 else 10.0 + 0j
+        step = min(floor, wall, left, key=lambda t: t.real)
+        x, z, vz, left = x + vx * step, z + vz * step - step**2, vz - 2 * step, left - step
+        if step == wall:
+            vx = -vx / 2
+        elif step == floor:
+            blow = 1.5 * (vz + slope * vx) / (1 + slope**2)
+            vx, vz, z = vx - slope * blow, vz - blow, -slope * x
+    assert left == 0
+    return [x, z, vx, vz]
+
+
+@pytest.mark.parametrize("later", [1e-2, 1e-5, 1e-8, -1e-5, -1e-8])
+def test_two_contacts_that_are_met_one_right_after_the_other(built, later):
+    """The ball meets the wall `later` seconds after the floor, or before it: its derivatives are those of the
+    parabolas in that order (a complex step of theirs)."""
+    model = thrown(0.2)
+    model = replace(model, start={**model.start, dynamicsymbols("z"): 0.8})
+    fmu = built(model, Scene("Corner", sensitivities=("x,z,der(x),der(z):v,b",)))
+    at = {"v": 1.0, "b": 1.0 + later}
+    found = run(fmu, 1.4, 2, {"b": at["b"]})[-1]
+    assert found["sensitivity.valid"]
+    for by, value in at.items():
+        right = in_the_corner(**{**at, by: value + 1e-30j}, until=1.4)
+        for name, number in zip(("x", "z", "velocity.x", "velocity.z"), right, strict=True):
+            mine = found[f"sensitivity.{name}.by.{by}"]
+            assert mine == pytest.approx(number.imag / 1e-30, abs=1e-9), (name, by)
+
+
+def above_and_below(order: int, part: float) -> Model:
+    """A ball falls on a floor at T, another comes up against a ceiling at T0 + part (T - T0), and T is T0."""
+    y, z = dynamicsymbols("y z")
+    m, g, w, c, T, T0 = symbols("m g w c T T0", positive=True)
+    then = part * T + (1 - part) * T0
+    return Model(
+        name="AboveAndBelow",
+        lagrangian=m * (y.diff() ** 2 + z.diff() ** 2) / 2 - m * g * (y + z),
+        coordinates={y: "m", z: "m"},
+        constraints=[
+            Contact("floor", y, restitution=0.5),
+            Contact("ceiling", c - z, restitution=0.5),
+        ][::order],
+        parameters=[
+            Parameter(m, 1.0, "kg"),
+            Parameter(g, 2.0, "m/s^2"),
+            Parameter(w, 2e-4, "m/s"),
+            Parameter(c, 1.0, "m"),
+            Parameter(T, 1.0, "s"),
+            Parameter(T0, 1.0, "s"),
+        ],
+        start={y: g * T**2 / 2, z: c - w * then - g * then**2 / 2, z.diff(): w + g * then},
+    )
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_two_contacts_of_which_one_is_hardly_touched(built, order):
+    """Two balls apart, one of which falls with 2 m/s on a floor at the instant, T, at which the other comes
+    up against a ceiling with w = 2e-4 m/s: y = e g T tau - g tau^2/2, z = c - e w tau - g tau^2/2 at tau
+    after it.  Where the second comes 1.05 dT later for dT, no derivative is told."""
+    both = "y,z,closing.*.time,closing.*.impulse:T,w,g"
+    alike, other = (
+        built(above_and_below(order, part), Scene("AboveAndBelow", sensitivities=(both,)))
+        for part in (1, 1.05)
+    )
+    found, tau = run(alike, 1.4, 2)[-1], 0.4
+    assert found["sensitivity.valid"]
+    expected = {"y.by.T": 3 * tau - 1, "y.by.w": 0.0, "y.by.g": (tau - tau**2) / 2}
+    expected |= {"z.by.T": 1e-4 + 2 * tau, "z.by.w": -tau / 2, "z.by.g": -(tau**2) / 2}
+    expected |= {f"closing.{name}.time.by.T": 1.0 for name in ("floor", "ceiling")}
+    expected |= {f"closing.{name}.time.by.w": 0.0 for name in ("floor", "ceiling")}
+    expected |= {"closing.floor.impulse.by.T": 3.0, "closing.floor.impulse.by.w": 0.0}
+    expected |= {"closing.ceiling.impulse.by.T": 0.0, "closing.ceiling.impulse.by.w": 1.5}
+    for name, value in expected.items():
+        assert found[f"sensitivity.{name}"] == pytest.approx(value, abs=1e-6), name
+    assert not run(other, 1.4, 2)["sensitivity.valid"][-1]
 
 
 def test_a_contact_that_is_only_touched(built):

@@ -15,8 +15,6 @@
 #include "segment.h"
 #include "thresholds.h"
 
-static const double SLOW = 1e-9;  /* speed of a gap, relative to the motion's own, that counts as none */
-
 /* What is said of each contact while an event is met: flags (contacts). */
 typedef struct {
     int *closed;   /* before the event, without those that depart; then the modes after it */
@@ -31,11 +29,7 @@ typedef struct {
 
 /* Speeds (m) of the contacts that count as none, of the G that was evaluated last. */
 static void find_slow(const Solver *s, double *slow) {
-    const System *system = s->system;
-    for (int c = 0; c < system->contacts; c++) {
-        const int k = system->contact[c];
-        slow[k] = SLOW * fmax(nominals_fall(s, c), mechanism_row_size(&s->stepped, k, s->state.scale + system->nq));
-    }
+    for (int c = 0; c < s->system->contacts; c++) slow[s->system->contact[c]] = modes_slow(s, c);
 }
 
 static Status find_near(Solver *s, Instant at, const int *happened, Flags *x) {

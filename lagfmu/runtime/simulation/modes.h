@@ -3,7 +3,16 @@
 #define LAGFMU_MODES_H
 
 #include "linkage.h"
+#include "nominals.h"
 #include "solver.h"
+
+static const double SLOW = 1e-9; /* speed of a gap, relative to the motion's own, that counts as none */
+
+/* The speed of contact c that counts as none, of the G that was evaluated last. */
+static inline double modes_slow(const Solver *s, int c) {
+    const double *speeds = s->state.scale + s->system->nq;
+    return SLOW * fmax(nominals_fall(s, c), mechanism_row_size(&s->stepped, s->system->contact[c], speeds));
+}
 
 /* The state (s->state at s->state.now.t) right after the event of the contacts flagged in `happened`:
  * a closed one opens, an open one is struck. */

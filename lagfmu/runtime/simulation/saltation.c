@@ -16,10 +16,11 @@
 
 #include "digits.h"
 #include "indicators.h"
+#include "modes.h"
 #include "segment.h"
 
 static const double GRAZES = 1e3;  /* tolerances by which a limit must be passed, at the bend that it has */
-static const double ALIKE = 1e-6;  /* of the largest: times of events that go together differ by less */
+static const double ALIKE = 1e-6;  /* of the largest, and of a natural time: times of what goes together differ less */
 
 void saltation_layout(Solver *s, Arena *scratch) {
     const System *system = s->system;
@@ -42,6 +43,7 @@ void saltation_layout(Solver *s, Arena *scratch) {
     x->values = arena_doubles(scratch, watched);
     x->slope = arena_doubles(scratch, watched);
     x->bend = arena_doubles(scratch, watched);
+    x->passed = arena_ints(scratch, watched);
     x->level = arena_doubles(scratch, watched);
     x->speed = arena_doubles(scratch, watched);
     x->was = arena_doubles(scratch, saltation_modes_size(system));
@@ -174,11 +176,10 @@ static const char *limit_name(const System *s, int i, const char **kind) {
 
 /* The event, in s->why. */
 static void name_event(Solver *s, const char *why) {
-    const int *left = s->state.left;
     const char *kind;
     (void)fail(&s->why, "the event at t = %s s", digits(s->state.now.t).text);
     for (int i = 0; i < indicators_count(s->system); i++) {
-        if (left[i] == 0) continue;
+        if (!s->saltation->passed[i]) continue;
         const char *name = limit_name(s->system, i, &kind);
         why_append(&s->why, ", %s%s%s%s", kind, name[0] != '\0' ? " '" : "", name, name[0] != '\0' ? "'" : "");
     }
@@ -204,38 +205,62 @@ static void find_changes_of_gaps(Solver *s, double t, const double *y, int c) {
         if (!s->state.closed[i]) s->saltation->slope[i] = s->sensitivity.df[system->contact[i]];
 }
 
+/* The limits that have been left are passed, and so are, if a contact lands, the open ones that touch then, to
+ * rounding: they are struck with it (modes.c). */
+static void find_struck(Solver *s) {
+    const System *system = s->system;
+    struct Saltation *x = s->saltation;
+    int lands = 0;
+    for (int c = 0; c < system->contacts; c++) lands |= x->passed[c] && !s->state.closed[c];
+    for (int c = 0; c < system->contacts && lands; c++)
+        x->passed[c] |= !s->state.closed[c] && fabs(x->level[c]) <= s->state.gap[c] && x->speed[c] < -modes_slow(s, c);
+}
+
+/* dt of column c for limit i, which is passed: whether it is that of the quickest.  An integration has left
+ * `tolerance` of the motion's own speed, of which one that is passed slowly has little. */
+static int alike(const Solver *s, int c, int i, double dt) {
+    const struct Saltation *x = s->saltation;
+    const Column *column = &s->column[c];
+    const int parameter = column->parameter;
+    const double natural = natural_pace(s), slowly = fmax(1, fabs(x->bend[i] / x->speed[i]) / natural);
+    const double size = parameter < 0 ? nominals_natural(s, column->state) : saltation_size(s, parameter);
+    const double least = size > 0 ? 1 / (natural * size) : 0;
+    const double part = fmax(ALIKE, GRAZES * s->settings.tolerance * slowly);
+    return fabs(dt - x->dt[c]) <= part * fmax(least, fmax(fabs(dt), fabs(x->dt[c])));
+}
+
 /* dt of the event's time for each column, by the limits that are passed. */
 static Status find_times(Solver *s, double t, const double *y) {
     const int watched = indicators_count(s->system);
     struct Saltation *x = s->saltation;
     const double natural = natural_pace(s);
+    double least = HUGE_VAL;
     if (indicators_at(s, t, y, x->level) != OK) return FAILED;
     if (saltation_limits(s, t, (Way){1, y, x->flow_before, -1, x->turn}) != OK) return FAILED;
     for (int i = 0; i < watched; i++) x->speed[i] = x->slope[i];
     if (find_speeds_of_gaps(s, t, y) != OK) return FAILED;
-    for (x->limit = 0; x->limit < watched && s->state.left[x->limit] == 0;) x->limit += 1;
+    find_struck(s);
     for (int i = 0; i < watched; i++) {
-        if (s->state.left[i] == 0) continue;
+        if (!x->passed[i]) continue;
         const double pace = fabs(x->bend[i] / x->speed[i]);
-        x->pace = fmax(x->pace, pace);
+        if (pace < least) {
+            x->limit = i;
+            least = pace;
+        }
         const int returns = x->speed[i] * x->bend[i] <= 0; /* beyond the limit it would turn round */
         if (!(pace < HUGE_VAL) || (returns && pace * sqrt(GRAZES * s->settings.tolerance) > natural))
             return fail(&s->why, "a limit is grazed: it is passed by hardly more than the tolerance");
     }
+    x->pace = fmax(natural, least);
     for (int c = 0; c < s->columns; c++) {
-        int any = 0;
         const Way along = {0, y, column_at(s, c), s->column[c].parameter, NULL};
         if (saltation_limits(s, t, along) != OK) return FAILED;
         find_changes_of_gaps(s, t, y, c);
-        for (int i = 0; i < watched; i++) {
-            if (s->state.left[i] == 0) continue;
-            const double dt = -x->slope[i] / x->speed[i];
-            if (any && !(fabs(dt - x->dt[c]) <= ALIKE * fmax(fabs(dt), fabs(x->dt[c]))))
+        x->dt[c] = -x->slope[x->limit] / x->speed[x->limit];
+        for (int i = 0; i < watched; i++)
+            if (x->passed[i] && !alike(s, c, i, -x->slope[i] / x->speed[i]))
                 return fail(&s->why, "with another %s they would not come at one instant, and it matters which is first",
                             s->column[c].name);
-            x->dt[c] = dt;
-            any = 1;
-        }
     }
     return OK;
 }
@@ -246,6 +271,7 @@ Status saltation_pass(Solver *s, Map map) {
     if (!*s->state.varied) return map(s, NULL, 0, 0);
     keep_before(s);
     x->pace = natural_pace(s);
+    for (int i = 0; i < indicators_count(s->system); i++) x->passed[i] = s->state.left[i] != 0;
     Status status = find_flow_before(s);
     if (status == OK) status = find_times(s, s->state.now.t, x->from);
     Why why = s->why;

@@ -15,7 +15,8 @@ struct Saltation {
     double *dt;                      /* (columns) of the event's time */
     double *there, *values, *slope, *bend; /* (states), (indicators) */
     double *level, *speed;           /* (indicators) at the event, and their rates there */
-    int limit;                       /* the first of those that are passed; -1: no event */
+    int *passed;                     /* (indicators) whether the event passes it */
+    int limit;                       /* of those that are passed the quickest; -1: no event */
     double pace;                     /* [1/s] the motion's natural rate; quicker where a limit is passed slowly */
     double *was, *modes, *others;    /* (saltation_modes_size()) before the map, after it, and beside that */
     Why ended;
