@@ -4,6 +4,9 @@
 
 lines     of the files of a room of lagfmu/, a layer of runtime/, tests/, benchmarks/; words of docs/*.md
 rooms     what stands directly in lagfmu/, but for runtime/
+files     of Python and C; members of `struct Solver`; how often C says `OPTIONAL.`
+places    files of lagfmu/ that say the word of one output (margin), of one saved number (lost_old), of one
+          method (rattle), but for what they say in comments and docstrings
 arrows    pairs of rooms, of which one imports from the other: at the top, in a function, for types alone, or
           by a name in a text (import_module)
 floors    rooms on the longest way along arrows; rooms of a circle are on one
@@ -41,6 +44,7 @@ DEFINED = re.compile(
 )
 CALLED = re.compile(r"(?<![\w.>])(\w+)\(")
 HANDED = re.compile(r"\(\*(\w+)\)\(")  # an argument that is a function
+SAMPLES = {"an output": "margin", "a saved number": "lost_old", "a method": "rattle"}
 UNSEEN = re.compile(r'"(?:\\.|[^"\\])*"|/\*.*?\*/', re.DOTALL)
 BUILD = """
 import os, sys, tempfile
@@ -81,6 +85,13 @@ def measured(tree: Path, junit: Path | None) -> Figures:
         "Python": sum(lines.values()),
         **layers,
         "C": sum(layers.values()),
+        "files, Python": len([*package.rglob("*.py")]),
+        "files, C": len([*package.glob("runtime/*/*.[ch]")]),
+        "members of Solver": members(package / "runtime" / "simulation" / "solver.h"),
+        "OPTIONAL.": sum(
+            p.read_text("utf-8").count("OPTIONAL.") for p in package.glob("runtime/*/*.c")
+        ),
+        **{f"places of {what}": places(package, word) for what, word in SAMPLES.items()},
         "tests": _lines([*tree.glob("tests/*.py"), *tree.glob("tests/*.c")]),
         "benchmarks": _lines(tree.glob("benchmarks/**/*.py")),
         "words of docs/": sum(len(p.read_text("utf-8").split()) for p in tree.glob("docs/*.md")),
@@ -101,6 +112,28 @@ def measured(tree: Path, junit: Path | None) -> Figures:
 
 def _lines(paths: Iterable[Path]) -> int:
     return sum(len(p.read_text("utf-8").splitlines()) for p in {*paths} if p.is_file())
+
+
+def members(header: Path) -> int:
+    """How many members `struct Solver` has."""
+    text = UNSEEN.sub("", header.read_text("utf-8"))
+    body = re.split(r"typedef struct Solver \{|\} Solver;", text)[1]
+    body = re.sub(r"\([^()]*\)", "", body)
+    return sum(line.count(",") + 1 for line in body.split(";") if line.strip())
+
+
+def places(package: Path, word: str) -> int:
+    """Files whose code, not their comments and docstrings, says a word."""
+    said = re.compile(rf"(?<![a-z]){word}(?![a-z])", re.IGNORECASE)
+    found = [p for p in package.rglob("*.[chp]*") if p.suffix in (".c", ".h", ".py")]
+    return sum(1 for p in found if said.search(_code(p)))
+
+
+def _code(path: Path) -> str:
+    text = path.read_text("utf-8")
+    if path.suffix != ".py":
+        return re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
+    return re.sub(r'"""[\s\S]*?"""|#.*', "", text)
 
 
 def imports(package: Path) -> dict[str, set[str]]:

@@ -2,9 +2,10 @@
 
     python benchmarks/same_bits.py OTHER [MODEL ...]
 
-Each checkout builds the scenes of its own models/ and runs the default experiment through fmpy; of every
-scene and output that both have: how many outputs agree in every bit, and of the others the largest
-difference, relative to the output's largest value, and when it first arises.
+Each checkout builds the scenes of its own models/ as FMI 2.0 and as FMI 3.0, and runs the default
+experiment through fmpy, by co-simulation and by model exchange; of every scene and output that both have: how
+many outputs agree in every bit, and of the others the largest difference, relative to the output's largest
+value, and when it first arises.
 """
 
 from __future__ import annotations
@@ -22,22 +23,39 @@ ROOT = Path(__file__).parent.parent
 
 
 def run(checkout: Path, folder: Path, models: list[str]) -> None:
-    """Every scene's result as NAME.npy in `folder`."""
-    command = [sys.executable, "-m", "lagfmu", "build", "--target", "native", "--no-check"]
-    for path in sorted((checkout / "models").glob("*.py")):
-        if not models or path.stem in models:
-            subprocess.run(
-                [*command, "--out", str(folder), str(path)],
-                cwd=checkout,
-                env={**os.environ, "PYTHONPATH": str(checkout)},
-                stdout=subprocess.DEVNULL,
-                check=True,
-            )
-    for path in (folder / "native").glob("*.fmu"):
-        variables = fmpy.read_model_description(str(path)).modelVariables
-        shown = [v for v in variables if v.type == "Real" and v.causality in ("output", "local")]
-        result = fmpy.simulate_fmu(str(path), output=[v.name for v in shown])
-        np.save(folder / f"{path.stem}.npy", result)
+    """Every scene's results in `folder`: of FMI 2.0 and 3.0, by co-simulation and by model exchange."""
+    for version in ("2", "3"):
+        built = folder / version
+        command = [sys.executable, "-m", "lagfmu", "build", "--target", "native", "--no-check"]
+        command += ["--fmi", version, "--out", str(built)]
+        for path in sorted((checkout / "models").glob("*.py")):
+            if not models or path.stem in models:
+                subprocess.run(
+                    [*command, str(path)],
+                    cwd=checkout,
+                    env={**os.environ, "PYTHONPATH": str(checkout)},
+                    stdout=subprocess.DEVNULL,
+                    check=True,
+                )
+        for path in built.rglob("*.fmu"):
+            _simulate(path, folder / f"{path.stem} {version}")
+
+
+def _simulate(fmu: Path, out: Path) -> None:
+    """The default experiment, each way as NAME WAY.npy."""
+    description = fmpy.read_model_description(str(fmu))
+    shown = [
+        v.name
+        for v in description.modelVariables
+        if v.type in ("Real", "Float64") and v.causality in ("output", "local")
+    ]
+    for way, offered in (
+        ("CoSimulation", description.coSimulation),
+        ("ModelExchange", description.modelExchange),
+    ):
+        if offered is not None:
+            result = fmpy.simulate_fmu(str(fmu), output=shown, fmi_type=way)
+            np.save(out.with_name(f"{out.name} {way}.npy"), result)
 
 
 def main() -> None:
@@ -52,10 +70,10 @@ def main() -> None:
             run(checkout, folder, models)
         for path in sorted(ours.glob("*.npy")):
             if not (theirs / path.name).is_file():
-                print(f"{path.stem:20} only here")
+                print(f"{path.stem:40} only here")
                 continue
             one, two = (np.load(f, max_header_size=10**6) for f in (path, theirs / path.name))
-            print(f"{path.stem:20} {compared(one, two)}")
+            print(f"{path.stem:40} {compared(one, two)}")
 
 
 def compared(a: np.ndarray, b: np.ndarray) -> str:

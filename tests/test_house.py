@@ -175,6 +175,11 @@ def test_preparing_is_a_pipeline() -> None:
         assert "from .prepare import" not in path.read_text(encoding="utf-8"), path.name
 
 
+def test_the_solver_is_no_store_of_scratch() -> None:
+    """What a part of the simulation needs for itself it keeps in memory that is laid out in its own files."""
+    assert HOUSE["members"](ROOT / "runtime" / "simulation" / "solver.h") <= 30
+
+
 def test_only_the_fmi_layer_says_fmi() -> None:
     """Nothing outside fmu/ and runtime/fmi/ names a function, a type or a file of one version of FMI: each is
     theirs alone; and in runtime/fmi/ the instance knows no version."""

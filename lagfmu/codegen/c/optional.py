@@ -8,10 +8,6 @@ from ...model.scene import Scene
 from ...numeric.system import System
 from .tables import entanglements
 
-AT_CONTACTS = (
-    *("contacts_modes", "impact_check", "landing_push_out", "landing_bring_back"),
-    *("modes_switch", "modes_departures", "modes_contradicted"),
-)
 NO_RUNGS = """
 #include "dependent.h"
 
@@ -53,11 +49,11 @@ def optional_source(
         f"    .methods[{place.upper()}] = &{menu[place]},\n" for place in METHODS if place in menu
     ]
     rows += [f"    .{method}_{part} = {method}_{part},\n" for method, part in _own(found)]
-    rows += ["    .events_find = events_find,\n"] if system.is_watched else []
-    rows += [f"    .{name} = {name},\n" for name in AT_CONTACTS if contacts]
+    rows += ["    .events = &EVENTS,\n"] if system.is_watched else []
+    rows += ["    .contacts = &CONTACTS,\n"] if contacts else []
     rows += ["    .switches = &SWITCHES,\n"] if system.switches else []
     if _may_cross(system):
-        rows.append("    .crossing_begins = crossing_begins,\n")
+        rows.append("    .crossing = &CROSSING,\n")
         rows += ["    .passage = &PASSAGE,\n"] if not system.frictions else []
     rows += ["    .friction = &FRICTION_EVENTS,\n"] if system.frictions else []
     rows += ["    .variation = &VARIATION,\n"] if scene.sensitivities else []

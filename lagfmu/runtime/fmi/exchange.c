@@ -83,7 +83,7 @@ Status exchange_nominals(Instance *x, double *nominals) {
     const System *system = x->solver.system;
     const int states = system_states(system);
     if (instance_start(x) != OK) return FAILED;
-    double *still = x->solver.work_advance, *scale = still + states;
+    double *still = x->work, *scale = still + states;
     memset(still, 0, (size_t)states * sizeof *still);
     nominals_shared(&x->solver, still, scale);
     for (int j = 0; j < states; j++) nominals[place_of(system, j)] = scale[j];
@@ -174,7 +174,7 @@ static Status find_beside(Instance *x, Direction d, double h, double *vdot) {
     Solver *s = &x->solver;
     const System *system = s->system;
     const int nq = system->nq, nv = system->nv;
-    double *y = s->work_advance, *u = x->back + 3 * nv + system->m;
+    double *y = x->work, *u = x->back + 3 * nv + system->m;
     state_gather(system, s->state.q, s->state.v, y);
     memcpy(u, s->drive.value, (size_t)system->inputs * sizeof *u);
     for (int j = 0; j < nq; j++) s->state.q[j] += h * d.dq[j];
@@ -235,7 +235,7 @@ Status exchange_derivatives(Instance *x, double *derivatives) {
     Solver *s = &x->solver;
     Mechanism *b = &s->stepped;
     const System *system = s->system;
-    double *rate = s->work_advance;
+    double *rate = x->work;
     if (exchange_evaluate(x) != OK) return FAILED;
     mechanism_rates(b, s->state.v, rate);
     for (int j = 0; j < system->nq; j++) derivatives[place_of(system, j)] = rate[j];

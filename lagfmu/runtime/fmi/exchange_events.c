@@ -81,9 +81,10 @@ static Status find_happened(Instance *x, int *any) {
     }
     if (s->system->frictions == 0) return OK;
     const int first = indicators_first_of_frictions(s->system);
-    OPTIONAL.friction->indicators(s, s->work_friction);
+    double *values = x->indicators;
+    OPTIONAL.friction->indicators(s, values);
     for (int i = 0; i < 2 * s->system->frictions; i++) {
-        x->happened[first + i] = s->work_friction[i] < -indicators_range(s, first + i).slack;
+        x->happened[first + i] = values[i] < -indicators_range(s, first + i).slack;
         *any |= x->happened[first + i];
     }
     return OK;
@@ -106,7 +107,7 @@ static Status judge_step(Instance *x, int *event) {
     if (s->state.now.dependent && are_close(&s->stepped.linear) && choose_rows(x) != OK) return FAILED;
     if (find_happened(x, &any) != OK) return FAILED;
     if (!any && s->system->frictions > 0) {
-        double *y = s->work_advance;
+        double *y = x->work;
         state_gather(s->system, s->state.q, s->state.v, y);
         if (OPTIONAL.friction->turn(s, s->state.now.t, y) != OK) return FAILED;
     }
@@ -143,7 +144,7 @@ static Status release(Instance *x, double drift) {
     Solver *s = &x->solver;
     if (s->system->contacts == 0) return OK;
     x->evaluated = 0;
-    return OPTIONAL.modes_departures(s, SHORT / s->state.now.rate, drift);
+    return OPTIONAL.contacts->departures(s, SHORT / s->state.now.rate, drift);
 }
 
 static Status project_state(Solver *s) {
@@ -184,16 +185,16 @@ static Status pass_event(Instance *x) {
                               x->happened + indicators_first_of_frictions(s->system)) != OK)
         return FAILED;
     const double inside = losses_energy(s, segment_instant(s, s->state.now.t));
-    if (OPTIONAL.landing_bring_back(s, x->happened, x->pull) != OK) return FAILED;
+    if (OPTIONAL.contacts->bring_back(s, x->happened, x->pull) != OK) return FAILED;
     s->state.now.lost += inside - losses_energy(s, segment_instant(s, s->state.now.t));
-    if (OPTIONAL.modes_switch(s, x->happened) != OK) return FAILED;
+    if (OPTIONAL.contacts->pass(s, x->happened) != OK) return FAILED;
     return choose_rows(x);
 }
 
 /* `act`, and whether it has changed the state. */
 static Status moving(Instance *x, Status (*act)(Instance *)) {
     Solver *s = &x->solver;
-    double *before = s->work_advance, *after = before + system_states(s->system);
+    double *before = x->work + 5 * system_states(s->system), *after = before + system_states(s->system);
     if (instance_start(x) != OK) return FAILED;
     state_gather(s->system, s->state.q, s->state.v, before);
     const double lost = s->state.now.lost;

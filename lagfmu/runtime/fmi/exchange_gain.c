@@ -28,6 +28,7 @@ static const double PART = 0x1p-20; /* of the coordinates' sizes: how far they a
 /* The state that is displaced: sizes and direction (states), in which direction[j] = 1 is one size. */
 typedef struct {
     Solver *s;
+    double *work; /* (2 states) */
     double *size, *direction, *rate; /* rate (states): where nothing is displaced */
 } Tried;
 
@@ -44,7 +45,7 @@ static Status move(Solver *s, double *rate) {
 static Status multiply(const Tried *x, double *length) {
     Solver *s = x->s;
     const int nq = s->system->nq, nv = s->system->nv;
-    double *y = s->work_advance, *rate = y + nq + nv;
+    double *y = x->work, *rate = y + nq + nv;
     state_gather(s->system, s->state.q, s->state.v, y);
     for (int j = 0; j < nq; j++) s->state.q[j] += PART * x->size[j] * x->direction[j];
     for (int i = 0; i < nv; i++) s->state.v[i] += PART * x->size[nq + i] * x->direction[nq + i];
@@ -73,9 +74,10 @@ static double own_rate(const Tried *x) {
 }
 
 /* The largest rate that an acceleration gives to what has a size that a row tells; an angle's is 1 rad. */
-static double sized_rate(Solver *s, const double *vdot) {
+static double sized_rate(const Tried *x, const double *vdot) {
+    const Solver *s = x->s;
     const System *system = s->system;
-    double *least = s->work_initial, rate = 0;
+    double *least = x->work, rate = 0;
     nominals_extents(system, s->p, least);
     for (int i = 0; i < system->nv; i++) {
         const double own = mechanism_reach(&s->stepped, least, i);
@@ -86,10 +88,11 @@ static double sized_rate(Solver *s, const double *vdot) {
 }
 
 /* The largest rate at which a row turns as the motion goes on, what moves being measured by its span (nv). */
-static double turning_rate(Solver *s, const double *span) {
+static double turning_rate(const Tried *x, const double *span) {
+    Solver *s = x->s;
     const System *system = s->system;
     Mechanism *b = &s->stepped;
-    double *G = s->sensitivity.dG, *q = s->work_advance, rate = 0;
+    double *G = s->sensitivity.dG, *q = x->work, rate = 0;
     const double ahead = PART / s->state.now.rate;
     const Instant at = segment_instant(s, s->state.now.t);
     memcpy(G, b->G, (size_t)system->entries * sizeof *G);
@@ -110,8 +113,8 @@ Status exchange_find_gain(Instance *x) {
     Solver *s = &x->solver;
     const int nq = s->system->nq, nv = s->system->nv;
     const double natural = s->state.now.rate;
-    double *size = s->work_events;
-    const Tried tried = {s, size, size + nq + nv, size + 2 * (nq + nv)};
+    double *size = x->work + 2 * (nq + nv);
+    const Tried tried = {s, x->work, size, size + nq + nv, size + 2 * (nq + nv)};
     x->gain = 0;
     if (s->system->m == 0 || x->imposed) return OK;
     segment_begin(s);
@@ -123,7 +126,7 @@ Status exchange_find_gain(Instance *x) {
         size[nq + i] = span * natural;
         tried.direction[i] = span;
     }
-    const double turning = turning_rate(s, tried.direction); /* of the G that was evaluated last */
-    x->gain = GAIN * fmin(natural, fmax(turning, fmax(own_rate(&tried), sized_rate(s, tried.rate + nq))));
+    const double turning = turning_rate(&tried, tried.direction); /* of the G that was evaluated last */
+    x->gain = GAIN * fmin(natural, fmax(turning, fmax(own_rate(&tried), sized_rate(&tried, tried.rate + nq))));
     return OK;
 }

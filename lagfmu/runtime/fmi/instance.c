@@ -16,7 +16,7 @@ static void *after(Arena *arena, char **base, size_t size) {
 void instance_layout(Instance *x, Arena *arena) {
     const System *system = MODEL_SYSTEM;
     x->solver.features = FEATURES;
-    x->solver.caller = x;
+    x->solver.caller.own = x;
     x->solver.columns = COLUMN_COUNT;
     x->solver.column = COLUMNS;
     Arena saved = {NULL, 0}, scratch = {NULL, 0};
@@ -41,6 +41,7 @@ void instance_layout(Instance *x, Arena *arena) {
         x->indicators = arena_doubles(&scratch, indicators_count(system));
         x->pull = arena_doubles(&scratch, system->contacts);
         observed_layout(&x->seen, &scratch, system);
+        x->work = arena_doubles(&scratch, 7 * system_states(system));
         x->back = arena_doubles(&scratch, 3 * system->nv + system->m + system->inputs);
         x->set_before = arena_doubles(&scratch, VARIABLE_COUNT);
         x->norm = arena_doubles(&scratch, system->quaternions);

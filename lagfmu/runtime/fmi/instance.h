@@ -57,6 +57,7 @@ typedef struct Instance {
     Past *past;             /* (estimated_count of the system) */
     double *multiplier;     /* (m) those that an importer has set */
     double *places;         /* (lookup_count) scratch */
+    double *work;           /* (7 states) of exchange.c, exchange_events.c and exchange_gain.c */
     double *back;           /* (3 nv + m + inputs) of exchange.c: changes of vdot, what leads back onto the constraints */
     int observed, evaluated;
     double *set_before;     /* (VARIABLE_COUNT) of component_initial.c */

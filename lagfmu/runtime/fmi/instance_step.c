@@ -94,20 +94,20 @@ static void open_step(Instance *x, double t_end) {
     between->finished = s->state.now.t;
     between->end = t_end;
     between->asked = NAN;
-    s->caller = x;
-    s->pause = pause_step;
+    s->caller.own = x;
+    s->caller.pause = pause_step;
     if (!between->supplies) return;
     memcpy(between->value, s->drive.value, (size_t)s->system->inputs * sizeof *between->value);
-    s->supply = supply;
+    s->caller.supply = supply;
 }
 
 /* The inputs that it supplied stay as they were at last. */
 static void close_step(Instance *x) {
     Solver *s = &x->solver;
-    s->pause = NULL;
-    if (s->supply == NULL) return;
-    s->supply(x, s->state.now.t, s->u);
-    s->supply = NULL;
+    s->caller.pause = NULL;
+    if (s->caller.supply == NULL) return;
+    s->caller.supply(x, s->state.now.t, s->u);
+    s->caller.supply = NULL;
     for (int k = 0; k < s->system->inputs; k++) {
         if (!x->between.supplied[k]) continue;
         s->drive.value[k] = x->expected[k] = x->between.value[k];
@@ -162,8 +162,8 @@ Status instance_step(Instance *x, double t_end) {
     const int implicit = s->state.now.choice.implicit;
     prepare_step(x, t_end);
     if (solver_advance(s, t_end) != OK) {
-        s->supply = NULL;
-        s->pause = NULL;
+        s->caller.supply = NULL;
+        s->caller.pause = NULL;
         instance_restore(x, x->backup);
         return FAILED;
     }

@@ -41,7 +41,7 @@ static const char *asked(int c, int k, PeakPart part) {
 
 /* Changes (PEAK_COUNT) of the quantities whose extremes are kept, along a column or, -1, the motion. */
 static Status change_of_peaked(Solver *s, int c, double *changes) {
-    Instance *x = s->caller;
+    Instance *x = s->caller.own;
     Direction d;
     x->seen.asked = 1;
     if (solver_observe(s, &x->seen) != OK) return FAILED;
@@ -74,7 +74,7 @@ static Status none_of_peak(Solver *s, int c, int k, const Top *top, int of_time,
 /* The change of the quantity's rate along x->direction, dt and the number of column c (-1: none), by central
  * differences of fourth order at states on the constraints; FAILED: there is none. */
 static Status change_of_rate(Solver *s, int k, int c, double dt, double *change, int *kink) {
-    struct Saltation *x = s->saltation;
+    struct Saltation *x = s->part.columns;
     const int size = column_size(s->system), parameter = c < 0 ? -1 : s->column[c].parameter;
     const double t = s->state.now.t, held = parameter < 0 ? 0 : s->p[parameter];
     const double step = saltation_step(s, (Way){dt, x->from, x->direction, parameter, NULL});
@@ -104,7 +104,7 @@ static Status change_of_rate(Solver *s, int k, int c, double dt, double *change,
 
 /* What is known at the state of now, which stands in x->from. */
 static Status find_top(Solver *s, int k, Top *top, int *kink) {
-    struct Saltation *x = s->saltation;
+    struct Saltation *x = s->part.columns;
     const int n = system_states(s->system);
     saltation_gather(s, x->from);
     x->pace = s->state.now.rate > 0 ? s->state.now.rate : 1;
@@ -122,7 +122,7 @@ static Status find_top(Solver *s, int k, Top *top, int *kink) {
 
 /* t_p of an extreme inside of a smooth motion, by column c. */
 static Status time_inside(Solver *s, int k, int c, const Top *top, double *later) {
-    struct Saltation *x = s->saltation;
+    struct Saltation *x = s->part.columns;
     double change;
     int kink;
     *later = 0;
@@ -179,7 +179,7 @@ static Status vary_left(Solver *s, int k, double sense, double near, int begun) 
         double later;
         if (asked(c, k, time_of(sense)) == NULL) continue;
         if (time_inside(s, k, c, &top, &later) != OK) return FAILED;
-        if (fabs(later) * size * s->saltation->pace > STAYS)
+        if (fabs(later) * size * s->part.columns->pace > STAYS)
             return none_of_peak(s, c, k, &top, 1, "it is the start, and would come later with a little more or less of a number");
     }
     return OK;
@@ -187,7 +187,7 @@ static Status vary_left(Solver *s, int k, double sense, double near, int begun) 
 
 /* At a given time, or at the time of an event. */
 static Status vary_here(Solver *s, const int *which, int at_event) {
-    struct Saltation *x = s->saltation;
+    struct Saltation *x = s->part.columns;
     if (at_event && change_of_peaked(s, -1, peaks_of(s)->rates) != OK) return FAILED;
     for (int c = 0; c < peaks_of(s)->columns; c++) {
         if (change_of_peaked(s, c, peaks_of(s)->changes) != OK) return FAILED;
@@ -205,7 +205,7 @@ static Status vary_here(Solver *s, const int *which, int at_event) {
 
 /* A record before an event, at its time: it goes with the event. */
 static void vary_before(Solver *s, const int *which) {
-    struct Saltation *x = s->saltation;
+    struct Saltation *x = s->part.columns;
     for (int c = 0; c < peaks_of(s)->columns; c++)
         for (int i = 0; i < 2 * PEAK_COUNT; i++) {
             if (!which[i]) continue;

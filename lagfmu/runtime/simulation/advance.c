@@ -25,6 +25,21 @@ static const char JUMPS[] = ": is there a force that jumps to and fro?";
 static const double AHEAD = 2;        /* natural times of the motion that a step may reach ahead, */
 static const double FAR_AHEAD = 1e6;  /* and communication steps: dense output keeps ten digits */
 
+/* Of advance.c alone. */
+struct AdvanceMemory {
+    double *y, *paused; /* (solver_width()) of a step; of where the caller looks */
+    double crowd_since; /* [s] events one upon the other: when they began, ... */
+    int crowd;          /* ... and how many there are */
+};
+
+void advance_layout(Solver *s, Arena *scratch) {
+    struct AdvanceMemory counted, *x = arena_take(scratch, 1, sizeof *x);
+    s->part.advance = x;
+    if (x == NULL) x = &counted;
+    x->y = arena_doubles(scratch, solver_width(s));
+    x->paused = arena_doubles(scratch, solver_width(s));
+}
+
 static const Method *method_of(const Solver *s) {
     return OPTIONAL.methods[s->state.now.choice.implicit ? RADAU5 : s->settings.method];
 }
@@ -65,7 +80,7 @@ static void keep(Solver *s) {
 /* Puts the integrator at the state; the indicators there. */
 static Status set_out(Solver *s) {
     State *x = &s->state;
-    double *y = s->work_advance;
+    double *y = s->part.advance->y;
     state_gather(s->system, x->q, x->v, y);
     if (s->columns > 0) columns_gather(s, y);
     if (stiffness_turn(&x->now.choice)) x->now.step = x->now.choice.longest;
@@ -90,7 +105,7 @@ static Status slide_on(Solver *s, const double *y1) {
 /* To where the integrator stood at t, before a step that failed or cannot be used; h: to try next. */
 static void take_back(Solver *s, double t, double h) {
     const Integrator *i = &s->integrator;
-    double *y = s->work_advance;
+    double *y = s->part.advance->y;
     if (i->t > t) s->state.now.lost_ahead = s->state.now.lost_old;
     memcpy(y, i->t > t ? i->y_old : i->y, (size_t)i->ny * sizeof *y);
     restart(s, t, y, h);
@@ -111,7 +126,7 @@ static Status step_clear(Solver *s, double bound, double longest) {
 static Status step_towards(Solver *s, double t_end, double bound, double longest) {
     Integrator *i = &s->integrator;
     const int watch = indicators_count(s->system) > 0;
-    double *y1 = s->work_advance;
+    double *y1 = s->part.advance->y;
     s->state.now.lost_old = s->state.now.lost_ahead;
     if (step_clear(s, bound, longest) != OK) return FAILED;
     if (!(s->taken > 0)) s->first = i->t - i->t_old;
@@ -124,7 +139,7 @@ static Status step_towards(Solver *s, double t_end, double bound, double longest
     if (segment_project(s, i->t, y1) != OK) return FAILED;
     if (segment_check_projection(s, i->t, i->y, y1) != OK) return FAILED;
     if (near && OPTIONAL.passage->find(s) != OK) return FAILED;
-    if (watch && OPTIONAL.events_find(s, y1) != OK) return FAILED;
+    if (watch && OPTIONAL.events->find(s, y1) != OK) return FAILED;
     if (s->system->frictions > 0 && slide_on(s, y1) != OK) return FAILED;
     if (s->columns > 0) OPTIONAL.variation->look(s);
     integrator_move(i, y1);
@@ -156,7 +171,7 @@ static void choose_method(Solver *s) {
     if (!choice->implicit && i->t > i->t_old && stiffness_due(choice) && segment_rate(s, i) == OK)
         stiffness_explicit_step(choice, i, magnitudes(s));
     if (!stiffness_turn(choice)) return;
-    double *y = s->work_advance;
+    double *y = s->part.advance->y;
     memcpy(y, i->y, (size_t)i->ny * sizeof *y);
     restart(s, i->t, y, choice->longest);
 }
@@ -182,7 +197,7 @@ static void put(Solver *s, double t, const double *y) {
 /* The state at t, within the step just taken. */
 static Status put_between(Solver *s, double t) {
     const Integrator *i = &s->integrator;
-    double *y = s->work_advance;
+    double *y = s->part.advance->y;
     if (i->method->coarse || s->state.now.rough) {
         if (segment_reach(s, i->t_old, i->y_old, t, y) != OK) return FAILED;
     } else {
@@ -262,14 +277,14 @@ static Status switch_modes(Solver *s, void *context, int c, double part) {
     (void)c;
     (void)part;
     if (s->system->switches > 0) OPTIONAL.switches->pass(s, s->state.left + s->system->contacts);
-    return s->system->contacts + s->system->frictions > 0 ? OPTIONAL.modes_switch(s, s->state.left) : OK;
+    return s->system->contacts + s->system->frictions > 0 ? OPTIONAL.contacts->pass(s, s->state.left) : OK;
 }
 
 /* The event in the step just taken: the state there, in the modes before it. */
 static Status reach_event(Solver *s) {
     Integrator *i = &s->integrator;
     const double t = s->state.now.event_time;
-    double *y = s->work_advance;
+    double *y = s->part.advance->y;
     if (s->system->frictions > 0 && count_loss(s, t) != OK) return FAILED;
     if (segment_reach(s, i->t_old, i->y_old, t, y) != OK) return FAILED;
     put(s, t, y);
@@ -359,13 +374,13 @@ static void pause_there(Solver *s, double *t_end) {
     State *x = &s->state;
     const Integrator *i = &s->integrator;
     const Numbers kept = x->now;
-    double *y = s->work_pause;
-    if (s->pause == NULL || x->now.event_count > 0 || !(i->t < *t_end)) return;
+    double *y = s->part.advance->paused;
+    if (s->caller.pause == NULL || x->now.event_count > 0 || !(i->t < *t_end)) return;
     state_gather(s->system, x->q, x->v, y);
     if (s->columns > 0) columns_gather(s, y);
     put(s, i->t, i->y);
     x->now.lost = kept.lost_ahead;
-    s->pause(s->caller, t_end);
+    s->caller.pause(s->caller.own, t_end);
     state_scatter(s->system, y, x->q, x->v);
     if (s->columns > 0) columns_scatter(s, y);
     x->now = kept;
@@ -398,15 +413,16 @@ static Status travel(Solver *s, double *end, double begun, Count first, int *met
 
 /* FAILED: so many events in next to no time that they may never end. */
 static Status check_crowd(Solver *s) {
-    Numbers *now = &s->state.now;
-    if (s->crowd == 0 || !(fabs(now->t - s->crowd_since) < AT_ONCE / nominals_pace(s))) {
-        s->crowd_since = now->t;
-        s->crowd = 0;
+    const Numbers *now = &s->state.now;
+    struct AdvanceMemory *x = s->part.advance;
+    if (x->crowd == 0 || !(fabs(now->t - x->crowd_since) < AT_ONCE / nominals_pace(s))) {
+        x->crowd_since = now->t;
+        x->crowd = 0;
     }
-    s->crowd += 1;
-    if (s->crowd < CHATTER) return OK;
-    (void)fail(&s->why, "%d events in %.1g s at t = %.17g s", CHATTER, now->t - s->crowd_since, now->t);
-    return tell_of_chatter(s, s->crowd_since, JUMPS);
+    x->crowd += 1;
+    if (x->crowd < CHATTER) return OK;
+    (void)fail(&s->why, "%d events in %.1g s at t = %.17g s", CHATTER, now->t - x->crowd_since, now->t);
+    return tell_of_chatter(s, x->crowd_since, JUMPS);
 }
 
 static Status complete_nominals(Solver *s, double span) {
@@ -428,7 +444,7 @@ Status solver_advance(Solver *s, double t_end) {
     resume(s);
     if (solver_meet(s) != OK || solver_follow(s) != OK) return FAILED;
     if (nominals_incomplete(s) && complete_nominals(s, t_end - begun) != OK) return FAILED;
-    if (s->halt == HALT_NEVER) s->crowd = 0; /* else they come one in each call */
+    if (s->halt == HALT_NEVER) s->part.advance->crowd = 0; /* else they come one in each call */
     while (now->t < t_end) {
         int met;
         if (travel(s, &t_end, begun, first, &met) != OK) return FAILED;

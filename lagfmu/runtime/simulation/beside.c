@@ -23,7 +23,7 @@ double saltation_size(const Solver *s, int parameter) {
 
 double saltation_step(const Solver *s, Way way) {
     const double natural = s->state.now.rate > 0 ? s->state.now.rate : 1;
-    double most = fabs(way.dt) * fmax(natural, s->saltation->pace * (BESIDE_STEP / BESIDE_PACE));
+    double most = fabs(way.dt) * fmax(natural, s->part.columns->pace * (BESIDE_STEP / BESIDE_PACE));
     for (int j = 0; j < system_states(s->system); j++) {
         const double size = fmax(fabs(way.y[j]), nominals_natural(s, j));
         if (size > 0) most = fmax(most, fabs(way.dy[j]) / size);
@@ -44,7 +44,7 @@ void saltation_values_along(Solver *s, Instant at, const double *y, const double
 
 Status saltation_limits(Solver *s, double t, Way way) {
     const int n = system_states(s->system), watched = indicators_count(s->system);
-    struct Saltation *x = s->saltation;
+    struct Saltation *x = s->part.columns;
     const int parameter = way.parameter;
     const double step = saltation_step(s, way), held = parameter < 0 ? 0 : s->p[parameter];
     for (int i = 0; i < watched; i++) {
@@ -71,7 +71,7 @@ Status saltation_limits(Solver *s, double t, Way way) {
 
 /* A state beside that of the event, onto the constraints, and on to the time at which the same limit is passed. */
 static Status reach_beside(Solver *s) {
-    struct Saltation *x = s->saltation;
+    struct Saltation *x = s->part.columns;
     State *state = &s->state;
     const int nq = s->system->nq;
     for (int round = 0;; round++) {
@@ -89,7 +89,7 @@ static Status reach_beside(Solver *s) {
 }
 
 Status saltation_map(Solver *s, const Jump *jump, int c, double dt) {
-    struct Saltation *x = s->saltation;
+    struct Saltation *x = s->part.columns;
     const int size = column_size(s->system), parameter = s->column[c].parameter;
     const double step = saltation_step(s, (Way){dt, x->from, x->direction, parameter, NULL});
     const double held = parameter < 0 ? 0 : s->p[parameter];

@@ -38,8 +38,8 @@ static Status find_force_scale(Solver *solver, int k, const double *forces, doub
 static Status most_wrong(Solver *s, Instant at, const double *q, const double *v, const int *modes,
                          const int *touching, const int *departing, int *found) {
     Mechanism *b = &s->stepped;
-    double *forces = s->work_contacts, *reach = forces + s->system->nv, worst = 0;
-    int *active = s->iwork_contacts;
+    double *forces = s->part.contacts->forces, *reach = s->part.contacts->reach, worst = 0;
+    int *active = s->part.contacts->active;
     *found = NONE;
     system_active(s->system, modes, active);
     if (mechanism_motion(b, at, q, v, active) == FAILED) return FAILED;
@@ -127,7 +127,7 @@ Status contacts_modes(Solver *s, Instant at, const double *q, const double *v, i
                       const int *touching, const int *departing) {
     const int contacts = s->system->contacts;
     size_t bytes = (size_t)contacts * sizeof *closed;
-    int *modes = s->iwork_contacts + s->system->m, *mark = modes + contacts, settled = 0;
+    int *modes = s->part.contacts->modes, *mark = modes + contacts, settled = 0;
     memcpy(modes, closed, bytes);
     if (follow_modes(s, at, q, v, modes, mark, touching, departing, &settled) == FAILED) return FAILED;
     if (!settled && try_all_modes(s, at, q, v, closed, modes, touching, departing, &settled) == FAILED)

@@ -16,6 +16,20 @@ static const double POLYNOMIAL[BESIDES] = {5, -10, 10, -5, 1}; /* through so man
 static const double OPENS = 2;           /* if the angle is so many times as wide there; ... */
 static const double FORCES_LOST = 1e-3;  /* of the forces at work: by how much multipliers may differ */
 
+struct CrossingMemory {
+    double *y, *rate; /* (solver_width()) beside a start */
+    double *sum;      /* (2 m + 3 nv) */
+};
+
+static void crossing_layout(Solver *s, Arena *scratch) {
+    struct CrossingMemory counted, *x = arena_take(scratch, 1, sizeof *x);
+    s->part.crossing = x;
+    if (x == NULL) x = &counted;
+    x->y = arena_doubles(scratch, solver_width(s));
+    x->rate = arena_doubles(scratch, solver_width(s));
+    x->sum = arena_doubles(scratch, 2 * s->system->m + 3 * s->system->nv);
+}
+
 Status crossing_factor(Solver *s, double t, const double *y, double off) {
     Mechanism *b = &s->stepped;
     if (mechanism_evaluate(b, segment_instant(s, t), y, y + s->system->nq) != OK) return FAILED;
@@ -47,7 +61,7 @@ static double rows_apart(Solver *s, double t, const double *y) {
 static Status go_beside(Solver *s, double t, double sizes, double *y) {
     const int nq = s->system->nq;
     Mechanism *b = &s->stepped;
-    double *rate = s->work_crossing, fastest = 0;
+    double *rate = s->part.crossing->rate, fastest = 0;
     for (int i = 0; i < s->system->nv; i++) {
         const int dimension = s->system->speed_dimension[i];
         const double span = dimension == s->system->angles ? 1 : mechanism_largest_alike(s->system, dimension, s->state.span);
@@ -65,7 +79,7 @@ static Status go_beside(Solver *s, double t, double sizes, double *y) {
  * the start. */
 static Status add_motion(Solver *s, double t, double sizes, double part, double *sum) {
     const int m = s->system->m;
-    double *y = s->work_advance;
+    double *y = s->part.crossing->y;
     Mechanism *b = &s->stepped;
     if (go_beside(s, t, sizes, y) != OK) return FAILED;
     const double apart = rows_apart(s, t, y);
@@ -100,7 +114,7 @@ static int all_unique(const Linear *l, int m) {
 static int lost(Solver *s, double t, double sizes, double apart) {
     const System *x = s->system;
     Mechanism *b = &s->stepped;
-    double *sum = s->work_crossing + solver_width(s), *vdot = sum + 2 * x->m, *forces = vdot + x->nv, *reach = forces + x->nv;
+    double *sum = s->part.crossing->sum, *vdot = sum + 2 * x->m, *forces = vdot + x->nv, *reach = forces + x->nv;
     memset(sum, 0, (size_t)(2 * x->m + x->nv) * sizeof *sum);
     for (int i = BESIDES - 1; i >= 0; i--) /* the nearest last: forces are those there */
         if (add_motion(s, t, (i + 1) * sizes, POLYNOMIAL[i], sum) != OK) return 1;
@@ -114,9 +128,9 @@ static int lost(Solver *s, double t, double sizes, double apart) {
 
 /* Speeds that were completed are known there to eps / apart, and multipliers, which are what is left of their squares, to
  * eps / apart^3; those that were given on one branch may be right all the same.  What the motion is beside tells. */
-Status crossing_begins(Solver *s) {
+static Status begins(Solver *s) {
     const double t = s->state.now.t;
-    double *y = s->work_advance, ahead, behind;
+    double *y = s->part.crossing->y, ahead, behind;
     Why rows = {""};
     state_gather(s->system, s->state.q, s->state.v, y);
     const double apart = rows_apart(s, t, y);
@@ -135,3 +149,5 @@ Status crossing_begins(Solver *s) {
                 "between the rows is %.3g, 0.01 is enough): start further beside it, or give the speeds of one branch",
                 rows.text, apart);
 }
+
+SHARED_VALUE const Crossing CROSSING = {crossing_layout, begins};

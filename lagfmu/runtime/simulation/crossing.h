@@ -15,8 +15,13 @@ SHARED Status crossing_factor(Solver *s, double t, const double *y, double off);
 /* Appends the rows that depend on each other, of those that were factored last, and how many they are. */
 SHARED int crossing_name_rows(Solver *s, Why *text);
 
-/* FAILED, with why: the start lies in such a configuration, or too near for multipliers to have digits.  Reached by
+/* begins: FAILED, with why: the start lies in such a configuration, or too near for multipliers to have digits.  Reached by
  * OPTIONAL: an FMU with less than two rows has none. */
-SHARED Status crossing_begins(Solver *s);
+typedef struct {
+    void (*layout)(Solver *s, Arena *scratch);
+    Status (*begins)(Solver *s);
+} Crossing;
+
+SHARED const Crossing CROSSING;
 
 #endif

@@ -18,6 +18,13 @@ static inline int event_search_doubles(int indicators) {
     return (SEARCH_MOST + indicators) * (1 + indicators) + indicators;
 }
 
+/* Of events.c, event_search.c and minimum_gap.c. */
+struct SearchMemory {
+    double *y;      /* (3 solver_width()) */
+    double *values; /* (indicators + event_search_doubles()) */
+    double *boxes;  /* (minimum_gap_doubles()) */
+};
+
 /* Fills `samples` for the step of s->integrator (dense output prepared), from state.indicator at its start
  * to the projected y1 at its end.  y (3 states): scratch. */
 SHARED Status event_search(Solver *s, const double *y1, double *y, Samples *samples);

@@ -12,6 +12,7 @@
 
 #include "event_search.h"
 #include "indicators.h"
+#include "minimum_gap.h"
 #include "nominals.h"
 #include "root.h"
 #include "segment.h"
@@ -200,10 +201,10 @@ static Status watch(Solver *s, const Samples *samples, double t, double *y) {
     return OK;
 }
 
-Status events_find(Solver *s, const double *y1) {
+static Status find_first(Solver *s, const double *y1) {
     const Integrator *i = &s->integrator;
     const int width = indicators_count(s->system);
-    double *y = s->work_events, *values = y + 3 * i->ny;
+    double *y = s->part.search->y, *values = s->part.search->values;
     Samples samples = {0, values + width, values + width + SEARCH_MOST + width};
     Sought x = {s, i->t_old, i->y_old, 0, {0, 0, 0, 0}, y, values};
     s->state.now.event_count = 0;
@@ -221,3 +222,15 @@ Status events_find(Solver *s, const double *y1) {
            (size_t)width * sizeof *samples.values);
     return OK;
 }
+
+static void search_layout(Solver *s, Arena *scratch) {
+    const int indicators = indicators_count(s->system);
+    struct SearchMemory counted, *x = arena_take(scratch, 1, sizeof *x);
+    s->part.search = x;
+    if (x == NULL) x = &counted;
+    x->y = arena_doubles(scratch, 3 * solver_width(s));
+    x->values = arena_doubles(scratch, indicators + event_search_doubles(indicators));
+    x->boxes = arena_doubles(scratch, minimum_gap_doubles(s->system));
+}
+
+SHARED_VALUE const Events EVENTS = {search_layout, find_first};

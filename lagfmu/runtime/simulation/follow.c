@@ -11,16 +11,16 @@ static Status carry(Solver *s) {
     const System *system = s->system;
     if (system->contacts == 0)
         system_active(system, s->state.closed, s->active);
-    else if (OPTIONAL.modes_departures(s, s->state.now.span, 0) != OK)
+    else if (OPTIONAL.contacts->departures(s, s->state.now.span, 0) != OK)
         return FAILED;
     const Instant at = segment_instant(s, s->state.now.t);
     if (mechanism_project(&s->stepped, at, s->state.q, s->state.v, s->active, s->state.offset, s->state.span) != OK)
         return FAILED;
-    return system->contacts > 0 ? OPTIONAL.landing_push_out(s) : OK;
+    return system->contacts > 0 ? OPTIONAL.contacts->push_out(s) : OK;
 }
 
 static Status follow_contacts(Solver *s) {
-    return s->system->contacts + s->system->frictions == 0 ? OK : OPTIONAL.modes_contradicted(s);
+    return s->system->contacts + s->system->frictions == 0 ? OK : OPTIONAL.contacts->contradicted(s);
 }
 
 /* What rests on a surface at which forces jump may be about to leave it. */

@@ -4,6 +4,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "contacts.h"
 #include "losses.h"
 #include "segment.h"
 #include "slip.h"
@@ -13,7 +14,7 @@ static const double UNDONE = 10; /* times what accelerations did since a slip wa
 
 /* What forces of constraint, which are known by now, add to the noise of slip velocities. */
 static void add_noise_at_work(Solver *s) {
-    double *speed = s->work_contacts, *reach = speed + s->system->nv;
+    double *speed = s->part.contacts->forces, *reach = s->part.contacts->reach;
     mechanism_at_work(&s->stepped, speed, reach);
     for (int j = 0; j < s->system->nv; j++) speed[j] = sqrt(s->state.span[j]) * sqrt(reach[j]);
     stick_slip_set_noise(s, speed, s->state.stick_slip);
@@ -22,7 +23,7 @@ static void add_noise_at_work(Solver *s) {
 static Status begin(Solver *s, Instant at, int *closed, const int *touching) {
     const System *system = s->system;
     Mechanism *b = &s->stepped;
-    double *speed = s->work_contacts;
+    double *speed = s->part.contacts->forces;
     if (mechanism_evaluate(b, at, s->state.q, s->state.v) != OK) return FAILED;
     for (int j = 0; j < system->nv; j++) speed[j] = fabs(s->state.v[j]);
     for (int e = 0; e < system->masses; e++) {
@@ -55,7 +56,7 @@ static Status change(Solver *s, Instant at, const int *left, int *closed, const 
     Mechanism *b = &s->stepped;
     if (mechanism_evaluate(b, at, s->state.q, s->state.v) != OK) return FAILED;
     Settling x = stick_slip_try(s, at);
-    int *ended = s->iwork_friction + 3 * system->frictions;
+    int *ended = s->part.frictions->flags + 3 * system->frictions;
     stick_slip_renew_noise(s, x.modes);
     for (int i = 0; i < system->frictions; i++) {
         x.begins[i] = left[2 * i] && s->state.stick_slip[i].sticks;
@@ -97,8 +98,8 @@ static Status stop(Solver *s, Instant at, const int *left) {
     const System *system = s->system;
     const int nv = system->nv;
     Mechanism *b = &s->stepped;
-    StickSlip *held = s->trial_modes;
-    double *y = s->work_friction + 2 * system->frictions, *v = y + system->nq, *change = v + nv;
+    StickSlip *held = s->part.frictions->trial;
+    double *y = s->part.frictions->work + 2 * system->frictions, *v = y + system->nq, *change = v + nv;
     const double lost = s->state.now.lost, pull = mechanism_square(b, b->vdot);
     double since = 0;
     int any = 0;
@@ -126,9 +127,9 @@ static Status stop(Solver *s, Instant at, const int *left) {
 static Status contradicted(Solver *s, Instant at, int *left, int *any) {
     const int count = s->system->frictions;
     const struct FrictionForces *f = s->stepped.friction;
-    slip_indicators(s, s->work_friction);
+    slip_indicators(s, s->part.frictions->work);
     for (int k = 0; k < 2 * count; k++) {
-        left[k] = s->work_friction[k] < -slip_range(s, k).slack;
+        left[k] = s->part.frictions->work[k] < -slip_range(s, k).slack;
         *any |= left[k];
     }
     if (*any) return OK;
@@ -167,7 +168,7 @@ static Status renew(Solver *s) {
 }
 
 static Status slip_off(Solver *s, Status (*carry)(Solver *s)) {
-    StickSlip *const modes = s->state.stick_slip, *loose = s->trial_modes;
+    StickSlip *const modes = s->state.stick_slip, *loose = s->part.frictions->trial;
     struct FrictionForces *friction = s->stepped.friction;
     for (int i = 0; i < s->system->frictions; i++) {
         loose[i] = modes[i];
@@ -183,8 +184,21 @@ static void attach(Solver *s) {
     if (s->stepped.friction != NULL) s->stepped.friction->stick_slip = s->state.stick_slip;
 }
 
+static void frictions_layout(Solver *s, Arena *scratch) {
+    const System *of = s->system;
+    const int frictions = of->frictions;
+    struct FrictionMemory counted, *x = arena_take(scratch, 1, sizeof *x);
+    s->part.frictions = x;
+    if (x == NULL) x = &counted;
+    x->trial = arena_take(scratch, (size_t)frictions, sizeof *x->trial);
+    x->work = arena_doubles(scratch, 2 * frictions + 3 * solver_width(s));
+    x->flags = arena_ints(scratch, 4 * frictions + 2 * of->contacts);
+    x->impact = arena_take(scratch, frictional_impact_doubles(of), sizeof *x->impact);
+    x->struck = arena_take(scratch, frictional_impact_ints(of), sizeof *x->struck);
+}
+
 SHARED_VALUE const FrictionEvents FRICTION_EVENTS = {
-    .sliding = &SLIDING, .doubles = frictional_impact_doubles, .ints = frictional_impact_ints,
+    .sliding = &SLIDING, .layout = frictions_layout,
     .attach = attach, .begin = begin, .change = change, .stop = stop, .contradicted = contradicted, .renew = renew, .slip_off = slip_off,
     .indicators = slip_indicators, .range = slip_range,
     .turns = slip_turns, .turn = slip_turn,

@@ -15,7 +15,7 @@
 
 typedef struct {
     const Sliding *sliding;
-    size_t (*doubles)(const System *s), (*ints)(const System *s); /* workspace of `impact` */
+    void (*layout)(Solver *s, Arena *scratch);
     /* The mechanism reads the modes of the state. */
     void (*attach)(Solver *s);
     /* At the start, with the contacts as they would be without frictions: all modes together. */

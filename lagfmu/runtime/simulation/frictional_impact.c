@@ -12,6 +12,7 @@
 
 #include "friction.h"
 #include "friction_events.h"
+#include "stick_slip.h"
 
 enum { FRICTIONAL_SWEEPS = 20000 };
 static const double FRICTIONAL_CLOSE = 1e-15; /* of the largest impulse: what a sweep may still change */
@@ -138,7 +139,7 @@ Status frictional_impact(Solver *s, Instant at, const double *q, const double *v
                const double *slip, double *e, Impulse plastic, Impulse found, int *done) {
     const System *system = s->system;
     const int rows = system->contacts + 2 * system->frictions, m = system->m;
-    FrictionalImpact x = {.s = s, .b = &s->stepped, .rows = s->iwork_frictional, .A = s->work_frictional};
+    FrictionalImpact x = {.s = s, .b = &s->stepped, .rows = s->part.frictions->struck, .A = s->part.frictions->impact};
     int *active;
     x.loaded = x.rows + rows;
     active = x.loaded + system->frictions;

@@ -13,6 +13,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "contacts.h"
 #include "digits.h"
 #include "optional.h"
 
@@ -211,7 +212,7 @@ Status impact(Solver *s, Instant at, const double *q, double *v, const int *ente
               double *Lambda) {
     const System *system = s->system;
     const int nv = system->nv, m = system->m, contacts = system->contacts;
-    Struck x = {.s = s, .b = &s->stepped, .slip = s->work_impact, .contact = s->iwork_impact};
+    Struck x = {.s = s, .b = &s->stepped, .slip = s->part.contacts->impact, .contact = s->part.contacts->struck};
     x.e = x.slip + m;
     x.zero = x.e + m;
     x.right = x.zero + m;
@@ -263,10 +264,10 @@ Status impacts(Solver *s, Instant at, const double *q, double *v, const int *tou
                const int *dead, int *struck) {
     const System *system = s->system;
     const int contacts = system->contacts;
-    int *entering = s->iwork_impact + impact_ints(system->m, contacts) - contacts;
-    double *Lambda = s->work_impact + impact_doubles(system->nv, system->m, contacts) - system->m;
+    int *entering = s->part.contacts->struck + impact_ints(system->m, contacts) - contacts;
+    double *Lambda = s->part.contacts->impact + impact_doubles(system->nv, system->m, contacts) - system->m;
     memset(struck, 0, (size_t)contacts * sizeof *struck);
-    memset(s->push, 0, (size_t)contacts * sizeof *s->push);
+    memset(s->part.contacts->push, 0, (size_t)contacts * sizeof *s->part.contacts->push);
     for (int round = 1; round <= IMPACT_ROUNDS; round++) {
         if (mechanism_evaluate(&s->stepped, at, q, v) != OK) return FAILED;
         if (!find_entering(s, v, touching, slow, round == IMPACT_ROUNDS, entering)) return OK;
@@ -274,7 +275,7 @@ Status impacts(Solver *s, Instant at, const double *q, double *v, const int *tou
         for (int c = 0; c < contacts; c++) {
             const double push = Lambda[system->contact[c]];
             if (!entering[c] || !(push > 0)) continue;
-            s->push[c] += push;
+            s->part.contacts->push[c] += push;
             struck[c] = 1;
         }
     }
@@ -283,7 +284,7 @@ Status impacts(Solver *s, Instant at, const double *q, double *v, const int *tou
 
 Status impact_check(Solver *s) {
     const System *system = s->system;
-    double *e = s->work_impact;
+    double *e = s->part.contacts->impact;
     const char *and = "the start is refused: ";
     s->why.text[0] = 0;
     system->restitution(s->p, e);

@@ -23,7 +23,7 @@ typedef struct {
 
 /* All impacts of an instant; v (nv) is replaced by the velocities after them.  `touching`: flags, the
  * contacts that an impact can reach; `slow` (m): speeds that count as none; `dead`: flags, contacts that do not rebound;
- * `struck`: flags, set for the contacts that took an impulse, which is in s->push.  FAILED: no velocities satisfy the
+ * `struck`: flags, set for the contacts that took an impulse, which is in s->part.contacts->push.  FAILED: no velocities satisfy the
  * contacts. */
 SHARED Status impacts(Solver *s, Instant at, const double *q, double *v, const int *touching, const double *slow,
                       const int *dead, int *struck);

@@ -18,6 +18,16 @@
 
 enum { STEP_HALVINGS = 25 };
 
+void start_layout(Solver *s, Arena *scratch) {
+    const System *of = s->system;
+    struct StartMemory counted, *x = arena_take(scratch, 1, sizeof *x);
+    s->part.start = x;
+    if (x == NULL) x = &counted;
+    x->moves = arena_take(scratch, (size_t)of->nv, sizeof *x->moves);
+    x->work = arena_doubles(scratch, 6 * of->nq + 3 * of->m);
+    x->rows = arena_ints(scratch, 2 * of->m + of->contacts);
+}
+
 Status initial_refused(Solver *s) {
     Why cause = s->why;
     return fail(&s->why, "the start is refused: %s", cause.text);
@@ -86,9 +96,9 @@ static Status cannot_be_projected(const Start *x, const int *rows, const double 
 static Status newton_at_start(const Start *x, int stage, double *q, const int *rows) {
     const System *s = x->s->system;
     Mechanism *b = &x->s->stepped;
-    double *trial = x->s->work_initial, *least = trial + s->nq, *f = least + s->nq;
+    double *trial = x->s->part.start->work, *least = trial + s->nq, *f = least + s->nq;
     double *f_trial = f + s->m, *allowed = f_trial + s->m;
-    int *own = x->s->iwork_initial + s->m;
+    int *own = x->s->part.start->rows + s->m;
     const int all = priority_rows(s, x->moves, stage, rows, own);
     nominals_extents(s, x->at.p, least);
     for (int j = 0; j < s->nq; j++)
@@ -128,7 +138,7 @@ static Status newton_at_start(const Start *x, int stage, double *q, const int *r
 static int depends_elsewhere(const Start *x, const double *q, int entry, double aside) {
     const System *s = x->s->system;
     Mechanism *b = &x->s->stepped;
-    double *elsewhere = x->s->work_initial, *along = elsewhere + s->nq;
+    double *elsewhere = x->s->part.start->work, *along = elsewhere + s->nq;
     memcpy(elsewhere, q, (size_t)s->nq * sizeof *q);
     for (int i = 0; i < s->nv; i++) along[i] = i == s->entry_column[entry] ? aside : 0;
     mechanism_kinematics(b, x->at, q);
@@ -163,7 +173,7 @@ static Status check_omissions(const Start *x, const double *q, int k, double f) 
 
 static Status check_all_omissions(const Start *x, const double *q, const int *rows) {
     const System *s = x->s->system;
-    double *f = x->s->work_initial + 2 * s->nq;
+    double *f = x->s->part.start->work + 2 * s->nq;
     if (mechanism_residual(&x->s->stepped, x->at, q, f) == FAILED) return initial_refused(x->s);
     for (int k = 0; k < s->m; k++)
         if (rows[k] && f[k] != 0 && check_omissions(x, q, k, f[k]) == FAILED) return FAILED;
@@ -173,7 +183,7 @@ static Status check_all_omissions(const Start *x, const double *q, const int *ro
 Status initial_positions(const Start *x, double *q, int *rows) {
     const System *s = x->s->system;
     const size_t bytes = (size_t)s->nq * sizeof *q;
-    double *given = x->s->work_initial + 5 * s->nq + 3 * s->m;
+    double *given = x->s->part.start->work + 5 * s->nq + 3 * s->m;
     int any = 0;
     for (int k = 0; k < s->m; k++) {
         if (s->rows[k].kind == NONHOLONOMIC) rows[k] = 0;
@@ -210,8 +220,8 @@ static int on_velocities(const Start *x, const double *least, const double *v, c
 Status initial_velocities(const Start *x, const double *q, const double *least, const int *rows, double *v) {
     const System *s = x->s->system;
     Mechanism *b = &x->s->stepped;
-    double *slip = x->s->work_initial + 3 * s->nq, *speed = slip + s->m;
-    int *own = x->s->iwork_initial + s->m;
+    double *slip = x->s->part.start->work + 3 * s->nq, *speed = slip + s->m;
+    int *own = x->s->part.start->rows + s->m;
     memcpy(v, x->v0, (size_t)s->nv * sizeof *v);
     for (int stage = 0; (stage = priority_stage(s, x->priority_v, stage)) < PRIORITIES; stage++) {
         memcpy(v, x->v0, (size_t)s->nv * sizeof *v);

@@ -14,6 +14,14 @@ typedef struct {
     const Priority *priority_v;         /* (nv) of the speeds */
 } Start;
 
+/* Of initialization.c, initial_projection.c and joint_start.c. */
+struct StartMemory {
+    Priority *moves; /* (nv) priority_moves() */
+    double *work;    /* (6 nq + 3 m) */
+    int *rows;       /* (2 m + contacts) */
+};
+SHARED void start_layout(Solver *s, Arena *scratch);
+
 /* "the start is refused: " before the cause. */
 SHARED Status initial_refused(Solver *s);
 

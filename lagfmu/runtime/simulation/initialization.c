@@ -65,8 +65,8 @@ static Status find_positions(const Start *x) {
     const System *s = x->s->system;
     State *state = &x->s->state;
     Mechanism *b = &x->s->stepped;
-    double *moved = x->s->work_initial + 3 * s->nq + 3 * s->m;
-    int *rows = x->s->iwork_initial;
+    double *moved = x->s->part.start->work + 3 * s->nq + 3 * s->m;
+    int *rows = x->s->part.start->rows;
     memcpy(state->q, x->q0, (size_t)s->nq * sizeof *state->q);
     if (mechanism_settle(b, x->at, state->q) == FAILED) return initial_refused(x->s);
     memset(state->closed, 0, (size_t)s->contacts * sizeof *state->closed);
@@ -166,8 +166,8 @@ static Status find_velocities(const Start *x) {
     const System *s = x->s->system;
     State *state = &x->s->state;
     Mechanism *b = &x->s->stepped;
-    double *natural = x->s->work_initial, *fastest = natural + s->nv, *shared = fastest + s->nv;
-    int *active = x->s->iwork_initial, low = 1;
+    double *natural = x->s->part.start->work, *fastest = natural + s->nv, *shared = fastest + s->nv;
+    int *active = x->s->part.start->rows, low = 1;
     if (mechanism_evaluate(b, x->at, state->q, x->v0) == FAILED) return initial_refused(x->s);
     if (check_masses(x) == FAILED) return FAILED;
     natural_speeds(x, natural);
@@ -191,9 +191,9 @@ static Status find_modes(const Start *x) {
     const System *s = x->s->system;
     State *state = &x->s->state;
     Mechanism *b = &x->s->stepped;
-    int *touching = x->s->iwork_initial + s->m;
+    int *touching = x->s->part.start->rows + s->m;
     memcpy(touching, state->closed, (size_t)s->contacts * sizeof *touching);
-    if (s->contacts > 0 && OPTIONAL.contacts_modes(x->s, x->at, state->q, state->v, state->closed,
+    if (s->contacts > 0 && OPTIONAL.contacts->modes(x->s, x->at, state->q, state->v, state->closed,
                                                 touching, NULL) == FAILED)
         return initial_refused(x->s);
     if (s->frictions > 0 &&
@@ -260,10 +260,10 @@ Status solver_start(Solver *s, double t, const double *q0, const double *v0, con
                     Moved moved, void *context) {
     if (check_start_finite(s, q0, v0) == FAILED) return FAILED;
     solver_clear(s, t);
-    const Start x = {s, segment_instant(s, t), q0, v0, priority, s->moves, priority + s->system->nq};
-    priority_moves(s->system, priority, s->moves);
+    const Start x = {s, segment_instant(s, t), q0, v0, priority, s->part.start->moves, priority + s->system->nq};
+    priority_moves(s->system, priority, s->part.start->moves);
     if (s->system->switches > 0) OPTIONAL.switches->settle(s, x.at, q0, v0, NULL, NULL);
-    if (s->system->contacts > 0 && OPTIONAL.impact_check(s) != OK) return FAILED;
+    if (s->system->contacts > 0 && OPTIONAL.contacts->check(s) != OK) return FAILED;
     s->stepped.dependent = 1; /* it is not known yet */
     nominals_sizes(s, x.at, q0);
     if (find_positions(&x) == FAILED) return FAILED;
@@ -275,8 +275,8 @@ Status solver_start(Solver *s, double t, const double *q0, const double *v0, con
     nominals_watch(s, x.at, s->state.q);
     nominals_gaps(s, x.at, s->state.q);
     if (find_nominals(&x) == FAILED) return FAILED;
-    if (OPTIONAL.crossing_begins != NULL && s->state.now.rate > 0) {
-        if (OPTIONAL.crossing_begins(s) != OK) return initial_refused(s);
+    if (OPTIONAL.crossing != NULL && s->state.now.rate > 0) {
+        if (OPTIONAL.crossing->begins(s) != OK) return initial_refused(s);
         if (mechanism_motion(&s->stepped, x.at, s->state.q, s->state.v, s->active) != OK) return initial_refused(s);
     }
     if (moved != NULL) initial_moved(&x, moved, context);

@@ -12,6 +12,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "initial_projection.h"
 #include "numbers.h"
 
 /* Sine squared of the angle between H_k and what is left free of it; of one that stays only where it may. */
@@ -24,7 +25,7 @@ void joint_layout(Solver *s, Arena *scratch) {
     const System *of = s->system;
     const int n = of->joint_count, nq = of->nq, nv = of->nv;
     struct JointSearch counted, *x = arena_take(scratch, 1, sizeof *x);
-    s->joint_search = x;
+    s->part.joints = x;
     if (x == NULL) x = &counted;
     x->priority = arena_take(scratch, (size_t)system_starts(of), sizeof *x->priority);
     x->held = arena_take(scratch, (size_t)nv, sizeof *x->held);
@@ -41,7 +42,7 @@ void joint_layout(Solver *s, Arena *scratch) {
 
 /* The model's own outputs at q, with `part` as speeds. */
 static void read_joints(Solver *s, const double *q) {
-    struct JointSearch *x = s->joint_search;
+    struct JointSearch *x = s->part.joints;
     const System *of = s->system;
     if (of->output_count == 0) return;
     of->outputs(x->at.t, q, x->part, x->at.u, x->at.p, x->zero, x->zero + of->nv, x->zero, x->own, x->other);
@@ -49,14 +50,14 @@ static void read_joints(Solver *s, const double *q) {
 
 double joint_along(const Solver *s, int k, const double *v) {
     const System *of = s->system;
-    const double *H = s->joint_search->H;
+    const double *H = s->part.joints->H;
     double sum = 0;
     for (int e = of->joint[k].begin; e < of->joint[k].end; e++) sum += H[e] * v[of->joint_rate[e].speed];
     return sum;
 }
 
 void joint_measure(Solver *s, const double *q) {
-    struct JointSearch *x = s->joint_search;
+    struct JointSearch *x = s->part.joints;
     const System *of = s->system;
     Mechanism *b = &s->stepped;
     mechanism_kinematics(b, x->at, q);
@@ -80,7 +81,7 @@ void joint_measure(Solver *s, const double *q) {
 }
 
 double joint_missing(Solver *s, const double *v) {
-    struct JointSearch *x = s->joint_search;
+    struct JointSearch *x = s->part.joints;
     const System *of = s->system;
     double most = 0;
     for (int k = 0; k < of->joint_count; k++) {
@@ -101,7 +102,7 @@ double joint_missing(Solver *s, const double *v) {
 
 /* part (nv) <- part + by H_k^T, of what moves. */
 static void push_joint(Solver *s, int k, double by) {
-    const struct JointSearch *x = s->joint_search;
+    const struct JointSearch *x = s->part.joints;
     const System *of = s->system;
     for (int e = of->joint[k].begin; e < of->joint[k].end; e++) {
         const int i = of->joint_rate[e].speed;
@@ -111,7 +112,7 @@ static void push_joint(Solver *s, int k, double by) {
 
 /* y (nv) = P part, where nothing that is held moves. */
 static Status find_response(Solver *s) {
-    struct JointSearch *x = s->joint_search;
+    struct JointSearch *x = s->part.joints;
     if (linear_nearest(&s->stepped.linear, x->part, x->zero, x->y, NULL) != OK) return FAILED;
     for (int i = 0; i < s->system->nv; i++)
         if (x->held[i] != OMITTED) x->y[i] = 0;
@@ -120,7 +121,7 @@ static Status find_response(Solver *s) {
 
 /* H_k M^-1 H_k^T by M's diagonal: what the constraints and other joints would leave of it at most. */
 static double free_of(const Solver *s) {
-    const struct JointSearch *x = s->joint_search;
+    const struct JointSearch *x = s->part.joints;
     const System *of = s->system;
     const double *M = s->stepped.M;
     double whole = 0;
@@ -133,7 +134,7 @@ static double free_of(const Solver *s) {
 
 /* Row k of A becomes that of L, with D_k at its end: 0 where nothing is left free, or it is not held. */
 static Status factor_joint(Solver *s, int k) {
-    struct JointSearch *x = s->joint_search;
+    struct JointSearch *x = s->part.joints;
     const int of = x->order[k], firmly = (int)joint_priority(s, of) >= x->least;
     double *row = row_of(x, k);
     memset(x->part, 0, (size_t)s->system->nv * sizeof *x->part);
@@ -158,7 +159,7 @@ static Status factor_joint(Solver *s, int k) {
 }
 
 void joint_arrange(Solver *s) {
-    struct JointSearch *x = s->joint_search;
+    struct JointSearch *x = s->part.joints;
     int count = 0;
     for (int priority = PRIORITIES - 1; priority >= 0; priority--)
         for (int k = 0; k < s->system->joint_count; k++)
@@ -166,10 +167,10 @@ void joint_arrange(Solver *s) {
 }
 
 Status joint_step(Solver *s, const int *rows) {
-    struct JointSearch *x = s->joint_search;
+    struct JointSearch *x = s->part.joints;
     const System *of = s->system;
     Mechanism *b = &s->stepped;
-    int *own = s->iwork_initial + of->m;
+    int *own = s->part.start->rows + of->m;
     double *c = x->share;
     (void)priority_rows(of, x->held, OMITTED, rows, own);
     if (priority_nearest(b, x->held, OMITTED, own, x->c) != OK) return FAILED;

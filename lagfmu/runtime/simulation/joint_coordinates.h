@@ -34,7 +34,7 @@ static inline int joint_place(const Solver *s, int k, int of_rates) {
 
 /* Who said the value, or the rate, that is looked for. */
 static inline Priority joint_priority(const Solver *s, int k) {
-    return s->joint_search->priority[joint_place(s, k, s->joint_search->of_rates)];
+    return s->part.joints->priority[joint_place(s, k, s->part.joints->of_rates)];
 }
 
 /* H v of joint coordinate k. */

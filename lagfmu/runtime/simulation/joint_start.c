@@ -31,7 +31,7 @@ enum { LEVEL_COUNT = sizeof LEVELS / sizeof *LEVELS, LEVELS_OF_GIVEN = 3 };
 
 /* What is missing a part of d further on, at `trial`, on the constraints; HUGE_VAL where there is no such place. */
 static double try_joints(Solver *s, double part, int *rows) {
-    struct JointSearch *x = s->joint_search;
+    struct JointSearch *x = s->part.joints;
     const Start start = {s, x->at, x->asked, x->zero, x->priority, x->held, x->priority + s->system->nq};
     mechanism_kinematics(&s->stepped, x->at, x->q);
     memcpy(x->trial, x->q, (size_t)s->system->nq * sizeof *x->q);
@@ -44,7 +44,7 @@ static double try_joints(Solver *s, double part, int *rows) {
 
 /* From x->q, by damped Newton's method in short steps, to where nothing is missing. */
 static Status find_joint_places(Solver *s, int *rows) {
-    struct JointSearch *x = s->joint_search;
+    struct JointSearch *x = s->part.joints;
     const System *of = s->system;
     memset(x->c, 0, (size_t)of->m * sizeof *x->c);
     joint_measure(s, x->q);
@@ -69,7 +69,7 @@ static Status find_joint_places(Solver *s, int *rows) {
 
 /* v at x->q with G v = nu and nothing missing; the second sweep removes rounding of the first. */
 static Status find_joint_rates(Solver *s, const int *rows) {
-    struct JointSearch *x = s->joint_search;
+    struct JointSearch *x = s->part.joints;
     joint_measure(s, x->q);
     (void)joint_missing(s, x->v);
     for (int sweep = 0; sweep < 2; sweep++) {
@@ -85,9 +85,9 @@ static Status find_joint_rates(Solver *s, const int *rows) {
 /* Values or rates from those of the state, by the first of `levels` at which they are reached; with the contacts in place
  * that are closed in it. */
 static Status find_joints(Solver *s, int of_rates, int levels) {
-    struct JointSearch *x = s->joint_search;
+    struct JointSearch *x = s->part.joints;
     const System *of = s->system;
-    int *rows = s->iwork_initial;
+    int *rows = s->part.start->rows;
     Status status = FAILED;
     x->of_rates = of_rates;
     joint_arrange(s);
@@ -112,7 +112,7 @@ static Status find_joints(Solver *s, int of_rates, int levels) {
 
 /* Whether a joint coordinate is, or its rate; who said what, of one that is a coordinate behind with the others. */
 static int any_joint_set(Solver *s, const double *begin, const Priority *priority) {
-    struct JointSearch *x = s->joint_search;
+    struct JointSearch *x = s->part.joints;
     const System *of = s->system;
     int any = 0;
     memcpy(x->asked, begin, (size_t)system_starts(of) * sizeof *begin);
@@ -131,7 +131,7 @@ static int any_joint_set(Solver *s, const double *begin, const Priority *priorit
 
 /* Whether all are, with their rates, where they are described at the state. */
 static int joints_stay(Solver *s) {
-    struct JointSearch *x = s->joint_search;
+    struct JointSearch *x = s->part.joints;
     int stay = 1;
     joint_measure(s, s->state.q);
     for (x->of_rates = 0; x->of_rates < 2; x->of_rates++) {
@@ -143,7 +143,7 @@ static int joints_stay(Solver *s) {
 
 /* One that is given or set speaks for the coordinates in it that the model gives, and its rate for the speeds. */
 static void begin_without_joints(Solver *s) {
-    struct JointSearch *x = s->joint_search;
+    struct JointSearch *x = s->part.joints;
     const System *of = s->system;
     joint_measure(s, s->state.q);
     for (int k = 0; k < of->joint_count; k++) {
@@ -164,7 +164,7 @@ static void begin_without_joints(Solver *s) {
 /* What the importer set is as it was asked for, or the start is refused; what the model gives is told where it is
  * not. */
 static Status check_joints(Solver *s, Moved moved, void *context) {
-    struct JointSearch *x = s->joint_search;
+    struct JointSearch *x = s->part.joints;
     int refused = 0;
     joint_measure(s, s->state.q);
     for (x->of_rates = 0; x->of_rates < 2; x->of_rates++) {
@@ -190,13 +190,13 @@ static Status check_joints(Solver *s, Moved moved, void *context) {
 
 /* A start whose values are x->q and whose rates are v (nv). */
 static Status start_at(Solver *s, const double *v) {
-    struct JointSearch *x = s->joint_search;
+    struct JointSearch *x = s->part.joints;
     return solver_start(s, x->at.t, x->q, v, x->priority, NULL, NULL);
 }
 
 /* Values, then rates; where contacts may open they are left aside, otherwise those stay that the latest start closed. */
 static Status find_joint_start(Solver *s, int may_open, int levels) {
-    struct JointSearch *x = s->joint_search;
+    struct JointSearch *x = s->part.joints;
     const size_t contacts = (size_t)s->system->contacts * sizeof *s->state.closed;
     if (may_open) memset(s->state.closed, 0, contacts);
     if (find_joints(s, 0, levels) != OK && levels < LEVEL_COUNT) return FAILED;
@@ -209,14 +209,14 @@ static Status find_joint_start(Solver *s, int may_open, int levels) {
 
 static Status start_by_joints(Solver *s, double t, const double *begin, const Priority *priority, Moved moved,
                               void *context) {
-    struct JointSearch *x = s->joint_search;
+    struct JointSearch *x = s->part.joints;
     const int nq = s->system->nq;
     const double *v0 = begin + nq;
     const int set = any_joint_set(s, begin, priority);
     if (solver_start(s, t, begin, v0, priority, NULL, NULL) != OK) return FAILED;
     x->at = segment_instant(s, t);
     if (!set && joints_stay(s)) {
-        const Start plain = {s, x->at, begin, v0, priority, s->moves, priority + nq};
+        const Start plain = {s, x->at, begin, v0, priority, s->part.start->moves, priority + nq};
         if (moved != NULL) initial_moved(&plain, moved, context);
         return OK;
     }
@@ -226,7 +226,7 @@ static Status start_by_joints(Solver *s, double t, const double *begin, const Pr
         (contacts == 0 || find_joint_start(s, 0, LEVEL_COUNT) != OK))
         return FAILED;
     if (moved == NULL) return OK;
-    const Start from = {s, x->at, x->asked, x->asked + nq, x->priority, s->moves, x->priority + nq};
+    const Start from = {s, x->at, x->asked, x->asked + nq, x->priority, s->part.start->moves, x->priority + nq};
     initial_moved(&from, moved, context);
     return check_joints(s, moved, context);
 }

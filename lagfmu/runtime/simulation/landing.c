@@ -13,6 +13,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "contacts.h"
 #include "segment.h"
 
 /* The speeds' change (m) on the rows `active`. */
@@ -40,7 +41,7 @@ static Status push_out(Solver *s, const int *acting, double *v) {
 Status landing_push_out(Solver *s) {
     const System *system = s->system;
     Mechanism *b = &s->stepped;
-    int *acting = s->iwork_initial, inside;
+    int *acting = s->part.contacts->acting, inside;
     system_active(system, s->state.closed, acting);
     do { /* what goes out may come inside another */
         inside = 0;
@@ -50,7 +51,7 @@ Status landing_push_out(Solver *s) {
             if (acting[k] || b->f[k] >= 0) continue;
             acting[k] = inside = 1;
         }
-        if (inside && push_out(s, acting, s->work_initial) != OK) return FAILED;
+        if (inside && push_out(s, acting, s->part.contacts->inside) != OK) return FAILED;
     } while (inside);
     return OK;
 }
@@ -59,8 +60,8 @@ Status landing_bring_back(Solver *s, const int *happened, const double *pull) {
     const System *system = s->system;
     const Instant at = segment_instant(s, s->state.now.t);
     Mechanism *b = &s->stepped;
-    int *acting = s->iwork_initial, any = 0;
-    double *v = s->work_initial, *dv = v + system->nv, *depth = dv + system->nv;
+    int *acting = s->part.contacts->acting, any = 0;
+    double *v = s->part.contacts->inside, *dv = v + system->nv, *depth = dv + system->nv;
     double *change = depth + system->m;
     system_active(system, s->state.closed, acting);
     if (mechanism_residual(b, at, s->state.q, b->f) != OK) return FAILED;

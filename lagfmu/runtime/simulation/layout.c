@@ -1,11 +1,10 @@
 /* layout.c -- the memory of a simulation, taken in two passes (arena.h). */
 #include "solver.h"
 
-#include "event_search.h"
 #include "feature.h"
-#include "impact.h"
-#include "indicators.h"
-#include "minimum_gap.h"
+#include "initial_projection.h"
+#include "losses.h"
+#include "nominals.h"
 #include "optional.h"
 #include "outputs.h"
 #include "column.h"
@@ -33,19 +32,33 @@ static void state_layout(Solver *solver, Arena *saved, Arena *scratch) {
     x->block_size = saved->used - begin;
 }
 
+/* What every FMU holds, and what this one does. */
+static void lay_out_parts(Solver *s, Arena *scratch) {
+    const System *system = s->system;
+    start_layout(s, scratch);
+    nominals_layout(s, scratch);
+    advance_layout(s, scratch);
+    losses_layout(s, scratch);
+    if (indicators_count(system) > 0) OPTIONAL.events->layout(s, scratch);
+    if (system->contacts + system->frictions > 0) OPTIONAL.contacts->layout(s, scratch);
+    if (system->frictions > 0) OPTIONAL.friction->layout(s, scratch);
+    if (system->switches > 0) OPTIONAL.switches->layout(s, scratch);
+    if (OPTIONAL.passage != NULL) OPTIONAL.passage->layout(s, scratch);
+    if (OPTIONAL.crossing != NULL) OPTIONAL.crossing->layout(s, scratch);
+    if (s->columns > 0) OPTIONAL.variation->layout(s, scratch);
+    if (system->joint_count > 0) OPTIONAL.joints->layout(s, scratch);
+}
+
 void solver_layout(Solver *s, Arena *saved, Arena *scratch, const System *system) {
-    const int nq = system->nq, nv = system->nv, states = system_states(system);
-    const int m = system->m, contacts = system->contacts;
-    const int indicators = indicators_count(system);
+    const int states = system_states(system);
     s->system = system;
-    const int width = solver_width(s);
     state_layout(s, saved, scratch);
     s->drive.value = arena_doubles(saved, system->inputs);
     s->drive.first = arena_doubles(saved, system->inputs);
     s->drive.second = arena_doubles(saved, system->inputs);
     s->p = arena_doubles(saved, system->parameters);
     Arena none = {NULL, 0}; /* the two never step within each other */
-    integrator_layout(&s->probe, scratch, &none, width, states, OPTIONAL.methods, METHOD_COUNT);
+    integrator_layout(&s->probe, scratch, &none, solver_width(s), states, OPTIONAL.methods, METHOD_COUNT);
     s->probe.scratch = s->integrator.scratch;
     s->probe.pivots = s->integrator.pivots;
     mechanism_layout(&s->stepped, scratch, system, &s->why,
@@ -53,42 +66,17 @@ void solver_layout(Solver *s, Arena *saved, Arena *scratch, const System *system
     if (OPTIONAL.friction != NULL) OPTIONAL.friction->attach(s);
     sensitivity_layout(&s->sensitivity, scratch, system);
     if (system->frictions > 0) s->sensitivity.slide = OPTIONAL.sliding_along;
-    s->moves = arena_take(scratch, (size_t)nv, sizeof *s->moves);
     s->active_full = NULL;
     if (system->embed != NULL && system->full->dynamics != NULL) {
         mechanism_layout(&s->full, scratch, system->full, &s->why, NULL);
         s->active_full = arena_ints(scratch, system->full->m);
     }
-    s->active = arena_ints(scratch, m);
+    s->active = arena_ints(scratch, system->m);
     s->scale = arena_doubles(scratch, states);
-    s->push = arena_doubles(scratch, contacts);
     s->u = arena_doubles(scratch, system->inputs + system->switches);
-    s->work_switches = arena_doubles(scratch, system->switches > 0 ? 2 * system->switches + states + nq : 0);
-    s->work_initial = arena_doubles(scratch, 6 * nq + 3 * m);
-    s->iwork_initial = arena_ints(scratch, 2 * m + contacts);
-    s->work_contacts = arena_doubles(scratch, 2 * nv + 3 * m);
-    s->iwork_contacts = arena_ints(scratch, m + 2 * contacts);
-    s->work_passage = arena_doubles(scratch, OPTIONAL.passage != NULL ? width : 0);
-    s->work_crossing = arena_doubles(scratch, OPTIONAL.crossing_begins != NULL ? width + 2 * m + 3 * nv : 0);
-    s->work_advance = arena_doubles(scratch, 2 * width);
-    s->work_pause = arena_doubles(scratch, width);
-    s->work_events = arena_doubles(scratch, 3 * width + indicators +
-                                                (indicators == 0 ? 0 : event_search_doubles(indicators)));
+    lay_out_parts(s, scratch);
     for (int k = 0; s->features != NULL && s->features[k] != NULL; k++)
         s->own[k] = s->features[k]->layout != NULL ? s->features[k]->layout(s, saved, scratch) : NULL;
-    s->work_gap = arena_doubles(scratch, minimum_gap_doubles(system));
-    if (s->columns > 0) OPTIONAL.variation->layout(s, scratch);
-    if (system->joint_count > 0) OPTIONAL.joints->layout(s, scratch);
-    const int frictions = system->frictions, some = frictions > 0;
-    s->work_frictional = arena_take(scratch, some ? OPTIONAL.friction->doubles(system) : 0, sizeof(double));
-    s->iwork_frictional = arena_take(scratch, some ? OPTIONAL.friction->ints(system) : 0, sizeof(int));
-    s->trial_modes = arena_take(scratch, (size_t)frictions, sizeof *s->trial_modes);
-    s->work_friction = arena_doubles(scratch, some * (2 * frictions + 3 * width));
-    s->iwork_friction = arena_ints(scratch, some * (4 * frictions + 2 * contacts));
-    s->iwork_events = arena_ints(scratch, 8 * contacts);
-    s->work_modes = arena_doubles(scratch, contacts == 0 && frictions == 0 ? 0 : m + nv);
-    s->work_impact = arena_doubles(scratch, contacts == 0 ? 0 : impact_doubles(nv, m, contacts));
-    s->iwork_impact = arena_ints(scratch, contacts == 0 ? 0 : impact_ints(m, contacts));
 }
 
 void observed_layout(Observed *o, Arena *arena, const System *system) {

@@ -7,6 +7,18 @@
 
 #include <string.h>
 
+struct LossesMemory {
+    double *before, *after; /* (nv) speeds */
+};
+
+void losses_layout(Solver *s, Arena *scratch) {
+    struct LossesMemory counted, *x = arena_take(scratch, 1, sizeof *x);
+    s->part.losses = x;
+    if (x == NULL) x = &counted;
+    x->before = arena_doubles(scratch, s->system->nv);
+    x->after = arena_doubles(scratch, s->system->nv);
+}
+
 double losses_energy(const Solver *s, Instant at) {
     double energy[2] = {0, 0};
     if (s->system->embed == NULL && s->system->energies != NULL)
@@ -18,7 +30,7 @@ Status losses_project(Solver *s, Instant at, int drifted) {
     const System *system = s->system;
     const Mechanism *b = &s->stepped;
     const size_t bytes = (size_t)system->nv * sizeof(double);
-    double *before = s->work_contacts, *after = before + system->nv;
+    double *before = s->part.losses->before, *after = s->part.losses->after;
     double lost = drifted ? losses_energy(s, at) : 0;
     memcpy(before, s->state.v, bytes);
     if (mechanism_project(&s->stepped, at, s->state.q, s->state.v, s->active, s->state.offset,

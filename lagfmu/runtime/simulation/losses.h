@@ -5,6 +5,8 @@
 #include "linkage.h"
 #include "solver.h"
 
+SHARED void losses_layout(Solver *s, Arena *scratch);
+
 /* s->state moved onto the rows in s->active (mechanism_project); what that takes counts as dissipated: of its
  * velocities, and, if `drifted`, of its positions, which an integrator has carried off the constraints. */
 SHARED Status losses_project(Solver *s, Instant at, int drifted);

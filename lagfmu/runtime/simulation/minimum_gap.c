@@ -29,7 +29,7 @@ static const Interval *bound_rates(Solver *s, double a, double b, double *y) {
     const Integrator *i = &s->integrator;
     const int nq = system->nq, states = system_states(system), inputs = system->inputs, driven = inputs + system->switches;
     const double t[3] = {a, a + (b - a) / 2, b};
-    double *u = s->work_gap;
+    double *u = s->part.search->boxes;
     Interval *q = (Interval *)(void *)(u + 3 * driven), *w = q + states, *rate = w + driven;
     for (int k = 0; k < 3; k++) {
         i->method->dense(i, t[k], y + k * i->ny);

@@ -53,7 +53,7 @@ static Status find_near(Solver *s, Instant at, const int *happened, Flags *x) {
 static Status strike_contacts(Solver *s, Instant at, const int *happened, Flags *x) {
     int landed = 0, *arrives = x->touching; /* what touches is found after the impacts */
     const int contacts = s->system->contacts;
-    double *slow = s->work_modes;
+    double *slow = s->part.contacts->slow;
     for (int c = 0; c < contacts; c++) landed |= happened[c] && !x->departing[c];
     if (!landed) return OK;
     if (mechanism_evaluate(&s->stepped, at, s->state.q, s->state.v) != OK) return FAILED;
@@ -92,8 +92,8 @@ static int find_low(Solver *s, const double *slow, const int *shut, Flags *x) {
 static Status settle_modes(Solver *s, Instant at, Flags *x) {
     const System *system = s->system;
     const double *q = s->state.q, *v = s->state.v;
-    double *slow = s->work_modes;
-    int *shut = s->iwork_events + 7 * system->contacts;
+    double *slow = s->part.contacts->slow;
+    int *shut = s->part.contacts->flags + 7 * system->contacts;
     memcpy(shut, x->closed, (size_t)system->contacts * sizeof *shut);
     if (mechanism_evaluate(&s->stepped, at, q, v) != OK) return FAILED;
     find_slow(s, slow);
@@ -116,7 +116,7 @@ static Status settle_modes(Solver *s, Instant at, Flags *x) {
 static int find_dead(const Solver *s, Flags *x) {
     int more = 0;
     for (int c = 0; c < s->system->contacts; c++) {
-        if (!x->low[c] || !(s->push[c] > 0) || x->dead[c]) continue;
+        if (!x->low[c] || !(s->part.contacts->push[c] > 0) || x->dead[c]) continue;
         x->dead[c] = more = 1;
     }
     return more;
@@ -129,7 +129,7 @@ static Status pass_contacts(Solver *s, Instant at, const int *happened, const do
     memset(x->dead, 0, (size_t)system->contacts * sizeof *x->dead);
     do {
         memcpy(s->state.v, arriving, (size_t)system->nv * sizeof *arriving);
-        memset(s->push, 0, (size_t)system->contacts * sizeof *s->push);
+        memset(s->part.contacts->push, 0, (size_t)system->contacts * sizeof *s->part.contacts->push);
         s->state.now.lost = lost;
         if (find_near(s, at, happened, x) != OK || strike_contacts(s, at, happened, x) != OK) return FAILED;
         if (settle_modes(s, at, x) != OK) return FAILED;
@@ -158,12 +158,12 @@ static void note_departure(Solver *s, int c) {
  * velocities `arriving` (nv) before any impact. */
 static void note_closings(Solver *s, const int *happened, const int *closed, const double *arriving) {
     double most = 0;
-    for (int c = 0; c < s->system->contacts; c++) most = fmax(most, s->push[c]);
+    for (int c = 0; c < s->system->contacts; c++) most = fmax(most, s->part.contacts->push[c]);
     for (int c = 0; c < s->system->contacts; c++) {
         const int landed = !s->state.closed[c] && (happened[c] || closed[c]);
-        if (!landed && !(s->push[c] > IMPACT_PULL * most)) continue;
+        if (!landed && !(s->part.contacts->push[c] > IMPACT_PULL * most)) continue;
         state_note(&s->state, s->system, CLOSING, c, s->state.q, arriving);
-        if (!s->state.looking) s->state.impulse[c] = s->push[c];
+        if (!s->state.looking) s->state.impulse[c] = s->part.contacts->push[c];
     }
 }
 
@@ -172,9 +172,9 @@ Status modes_switch(Solver *s, const int *happened) {
     const int contacts = system->contacts;
     const Instant at = segment_instant(s, s->state.now.t);
     const int rubs = system->frictions > 0;
-    double *arriving = s->work_modes + system->m;
+    double *arriving = s->part.contacts->arriving;
     memcpy(arriving, s->state.v, (size_t)system->nv * sizeof *arriving);
-    int *flags = s->iwork_events;
+    int *flags = s->part.contacts->flags;
     Flags x = {flags,
                flags + contacts,
                flags + 2 * contacts,
@@ -252,8 +252,8 @@ static Status find_contradicted(Solver *s, Instant at, int *left, int *any) {
     const size_t bytes = (size_t)contacts * sizeof *left;
     const double *q = s->state.q, *v = s->state.v;
     Mechanism *b = &s->stepped;
-    int *modes = s->iwork_events, *touching = modes + contacts;
-    double *slow = s->work_modes;
+    int *modes = s->part.contacts->flags, *touching = modes + contacts;
+    double *slow = s->part.contacts->slow;
     memset(left, 0, (size_t)indicators_count(system) * sizeof *left);
     if (mechanism_residual(b, at, q, b->f) != OK || mechanism_evaluate(b, at, q, v) != OK) return FAILED;
     find_slow(s, slow);
@@ -276,3 +276,26 @@ Status modes_contradicted(Solver *s) {
     if (find_contradicted(s, segment_instant(s, s->state.now.t), s->state.left, &any) != OK) return FAILED;
     return any ? modes_switch(s, s->state.left) : OK;
 }
+
+static void contacts_layout(Solver *s, Arena *scratch) {
+    const System *of = s->system;
+    const int nv = of->nv, m = of->m, contacts = of->contacts;
+    struct ContactMemory counted, *x = arena_take(scratch, 1, sizeof *x);
+    s->part.contacts = x;
+    if (x == NULL) x = &counted;
+    x->forces = arena_doubles(scratch, nv);
+    x->reach = arena_doubles(scratch, nv);
+    x->slow = arena_doubles(scratch, m);
+    x->arriving = arena_doubles(scratch, nv);
+    x->push = arena_doubles(scratch, contacts);
+    x->impact = arena_doubles(scratch, contacts == 0 ? 0 : impact_doubles(nv, m, contacts));
+    x->inside = arena_doubles(scratch, 2 * nv + 2 * m);
+    x->active = arena_ints(scratch, m);
+    x->modes = arena_ints(scratch, 2 * contacts);
+    x->flags = arena_ints(scratch, 8 * contacts);
+    x->struck = arena_ints(scratch, contacts == 0 ? 0 : impact_ints(m, contacts));
+    x->acting = arena_ints(scratch, m);
+}
+
+SHARED_VALUE const Contacts CONTACTS = {contacts_layout,          impact_check,       contacts_modes,   modes_switch,
+                                        modes_departures, modes_contradicted, landing_push_out, landing_bring_back};

@@ -55,6 +55,17 @@ static int shares(const System *system, int i, int j) {
     return system->dimension[j] == system->speed_dimension[i] && system->dimension[j] != system->angles;
 }
 
+struct NominalsMemory {
+    double *work; /* (6 nq) */
+};
+
+void nominals_layout(Solver *s, Arena *scratch) {
+    struct NominalsMemory counted, *x = arena_take(scratch, 1, sizeof *x);
+    s->part.nominals = x;
+    if (x == NULL) x = &counted;
+    x->work = arena_doubles(scratch, 6 * s->system->nq);
+}
+
 void nominals_extents(const System *s, const double *p, double *least) {
     for (int j = 0; j < s->nq; j++) {
         least[j] = s->folded != NULL ? s->folded[j] : 0;
@@ -83,7 +94,7 @@ static void find_spans(Solver *s) {
 
 void nominals_sizes(Solver *s, Instant at, const double *q) {
     const System *system = s->system;
-    double *size = s->state.size, *least = s->work_initial;
+    double *size = s->state.size, *least = s->part.nominals->work;
     double turn = 0;
     share_extents(system, s->p, least);
     for (int j = 0; j < system->nq; j++) {
@@ -283,7 +294,7 @@ static double moving_rate(const Solver *s, const double *least) {
  * returned; `moving`: that of the speeds. */
 static double find_own(Solver *s, double span, const double *felt, double *own, double *moving) {
     const System *system = s->system;
-    double *least = s->work_initial, steady = 0, natural = 0;
+    double *least = s->part.nominals->work, steady = 0, natural = 0;
     nominals_extents(system, s->p, least);
     const double slowest = slowest_rate(s);
     *moving = moving_rate(s, least);
@@ -341,7 +352,7 @@ static Status find_held(Solver *s, Instant at, double *back, double *shaken) {
     const int nv = s->system->nv;
     State *state = &s->state;
     Mechanism *b = &s->stepped;
-    double *vdot = s->work_initial, *q = shaken + nv, omega = 0;
+    double *vdot = s->part.nominals->work, *q = shaken + nv, omega = 0;
     int evaluated = 1;
     memcpy(vdot, b->vdot, (size_t)nv * sizeof *vdot);
     memcpy(q, state->q, (size_t)s->system->nq * sizeof *q);
@@ -431,8 +442,8 @@ static Status find_scales(Solver *s, const double *own, const double *shaken) {
 
 Status nominals_complete(Solver *s, Instant at, double span) {
     const int n = s->system->nq;
-    double *felt = s->work_initial + n, *own = felt + n, *back = own + n, *shaken = back + n;
-    find_felt(&s->stepped, s->work_initial, felt);
+    double *felt = s->part.nominals->work + n, *own = felt + n, *back = own + n, *shaken = back + n;
+    find_felt(&s->stepped, s->part.nominals->work, felt);
     memcpy(s->state.felt, felt, (size_t)s->system->nv * sizeof *felt);
     double moving;
     const double natural = find_own(s, span, felt, own, &moving);

@@ -7,6 +7,8 @@
 
 static const double STILL = 1e-100; /* scale of what neither moves nor is pushed: anything else exceeds it */
 
+SHARED void nominals_layout(Solver *s, Arena *scratch);
+
 /* least (nq): for each coordinate the largest parameter of its dimension that stands in its rows; 0 for an angle. */
 SHARED void nominals_extents(const System *s, const double *p, double *least);
 

@@ -26,20 +26,13 @@ typedef struct {
                           const double *u, const double *p, const Control *control,
                           double t_bound);
     /* Finds events; NULL where there is nothing to watch. */
-    Status (*events_find)(Solver *s, const double *y1);
-    /* What happens at contacts; NULL where there are none. */
-    Status (*contacts_modes)(Solver *s, Instant at, const double *q, const double *v, int *closed,
-                             const int *touching, const int *departing);
-    Status (*impact_check)(Solver *s);
-    Status (*landing_push_out)(Solver *s);
-    Status (*landing_bring_back)(Solver *s, const int *happened, const double *pull);
-    Status (*modes_switch)(Solver *s, const int *happened);
-    Status (*modes_departures)(Solver *s, double span, double drift);
-    Status (*modes_contradicted)(Solver *s);
+    const Events *events;
+    /* What happens at contacts; NULL where there are none, and no frictions. */
+    const Contacts *contacts;
     /* Of forces that jump; NULL where none do. */
     const Switches *switches;
     /* Of singular configurations: at the start, NULL with less than two constraints; passed through, or with frictions. */
-    Status (*crossing_begins)(Solver *s);
+    const Crossing *crossing;
     const Passage *passage;
     /* What constraints that hold by friction need; NULL where there are none. */
     const FrictionEvents *friction;

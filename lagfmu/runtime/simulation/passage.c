@@ -37,12 +37,24 @@ static const double LOOK_AHEAD = 1e-4; /* natural times, in which it is seen how
 static const double LANDED = 1e-3;    /* angle below which a step ended in a crossing, from which none begins */
 static const double PLACED = 1e-9;   /* of a step: how well the time of a passage is found */
 static const double BESIDE = 1e-3;   /* of a step: how far beside it all rows are looked at */
+
+struct PassageMemory {
+    double *there; /* (solver_width()) of a stage, or beside one */
+};
+
+static void passage_layout(Solver *s, Arena *scratch) {
+    struct PassageMemory counted, *x = arena_take(scratch, 1, sizeof *x);
+    s->part.passage = x;
+    if (x == NULL) x = &counted;
+    x->there = arena_doubles(scratch, solver_width(s));
+}
+
 /* How fast the angle falls [1/s] at the state where a step begins; y is left to the scratch. */
 static double falling(Solver *s, double t, const double *y, double apart) {
     const int nq = s->system->nq;
     Mechanism *b = &s->stepped;
     const double ahead = LOOK_AHEAD / s->state.now.rate;
-    double *there = s->work_passage;
+    double *there = s->part.passage->there;
     mechanism_kinematics(b, segment_instant(s, t), y);
     mechanism_rates(b, y + nq, there);
     for (int j = 0; j < nq; j++) there[j] = y[j] + ahead * there[j];
@@ -88,25 +100,25 @@ static double longest(const Solver *s, double next) {
 
 static int suspected(const Solver *s) {
     const Approach *x = &s->state.now.approach;
-    return x->near || (s->narrowest < NARROW && s->narrowest < fabs(x->apart) / 2);
+    return x->near || (s->stages.narrowest < NARROW && s->stages.narrowest < fabs(x->apart) / 2);
 }
 
 static int landed(const Solver *s, double *h) {
-    if (!suspected(s) || !(s->apart < LANDED)) return 0;
+    if (!suspected(s) || !(s->stages.apart < LANDED)) return 0;
     *h = (1 - BACKED) * (s->integrator.t - s->integrator.t_old);
     return 1;
 }
 
 static const double *stage(Solver *s, double t, const double *y) {
-    memcpy(s->work_passage, y, (size_t)solver_width(s) * sizeof *y);
-    return segment_project(s, t, s->work_passage) == OK ? s->work_passage : NULL;
+    memcpy(s->part.passage->there, y, (size_t)solver_width(s) * sizeof *y);
+    return segment_project(s, t, s->part.passage->there) == OK ? s->part.passage->there : NULL;
 }
 
 static Status height_of_rows(void *context, double elapsed, double *value) {
     Solver *s = context;
     const Integrator *i = &s->integrator;
-    i->method->dense(i, i->t_old + elapsed, s->work_passage);
-    if (crossing_factor(s, i->t_old + elapsed, s->work_passage, DBL_MIN) != OK) return FAILED;
+    i->method->dense(i, i->t_old + elapsed, s->part.passage->there);
+    if (crossing_factor(s, i->t_old + elapsed, s->part.passage->there, DBL_MIN) != OK) return FAILED;
     *value = -linear_apart(&s->stepped.linear);
     return OK;
 }
@@ -117,11 +129,11 @@ static Status tell(Solver *s, double t) {
     Why rows = {""};
     if (s->state.now.dependent) {
         const double beside = t + BESIDE * (i->t - i->t_old);
-        i->method->dense(i, beside, s->work_passage);
-        if (!all_narrow(s, beside, s->work_passage, 0)) return OK;
+        i->method->dense(i, beside, s->part.passage->there);
+        if (!all_narrow(s, beside, s->part.passage->there, 0)) return OK;
     }
-    i->method->dense(i, t, s->work_passage);
-    if (crossing_factor(s, t, s->work_passage, CROSSING_NAMING) != OK) return FAILED;
+    i->method->dense(i, t, s->part.passage->there);
+    if (crossing_factor(s, t, s->part.passage->there, CROSSING_NAMING) != OK) return FAILED;
     if (crossing_name_rows(s, &rows) == 0) return OK;
     why_append(&s->passed, "%sat t = %.9g s the motion passes, smoothly, a singular configuration: the constraints %s "
                            "depend on each other there, another branch begins, and next to it lambda and the "
@@ -164,4 +176,4 @@ static void explain(Solver *s) {
                    digits(i->t).text, rows.text);
 }
 
-SHARED_VALUE const Passage PASSAGE = {look, longest, stage, suspected, landed, find_passage, explain};
+SHARED_VALUE const Passage PASSAGE = {passage_layout, look, longest, stage, suspected, landed, find_passage, explain};

@@ -7,6 +7,7 @@
 
 /* All of it is reached by one pointer (optional.h), NULL in an FMU with less than two rows, or with frictions. */
 typedef struct {
+    void (*layout)(Solver *s, Arena *scratch);
     /* At the state y (states) on the constraints where a step begins, whose rows were just factored: is such a
      * configuration near?  s->state.now.approach says so from here on. */
     void (*look)(Solver *s, double t, const double *y);

@@ -26,7 +26,7 @@ void saltation_layout(Solver *s, Arena *scratch) {
     const System *system = s->system;
     const int size = column_size(system), n = system_states(system), watched = indicators_count(system);
     struct Saltation counted, *x = arena_take(scratch, 1, sizeof *x);
-    s->saltation = x;
+    s->part.columns = x;
     if (x == NULL) x = &counted;
     x->before = arena_take(scratch, s->state.block_size, 1);
     x->after = arena_take(scratch, s->state.block_size, 1);
@@ -55,14 +55,14 @@ void saltation_layout(Solver *s, Arena *scratch) {
 
 void saltation_end(Solver *s) {
     const int size = column_size(s->system) * s->columns;
-    s->saltation->ended = s->why;
+    s->part.columns->ended = s->why;
     *s->state.varied = 0;
     memset(s->state.variation, 0, (size_t)size * sizeof *s->state.variation);
 }
 
 const char *saltation_ended(Solver *s, Why *text) {
-    *text = s->saltation->ended;
-    s->saltation->ended.text[0] = '\0';
+    *text = s->part.columns->ended;
+    s->part.columns->ended.text[0] = '\0';
     return text->text;
 }
 
@@ -81,7 +81,7 @@ Status saltation_flow(Solver *s, double t, const double *y, double *flow) {
 
 /* phi- at the event, x->from, and x->turn: its change along the motion, by a difference. */
 static Status find_flow_before(Solver *s) {
-    struct Saltation *x = s->saltation;
+    struct Saltation *x = s->part.columns;
     const int n = system_states(s->system);
     const double t = s->state.now.t;
     if (saltation_flow(s, t, x->from, x->flow_before) != OK) return FAILED;
@@ -93,14 +93,14 @@ static Status find_flow_before(Solver *s) {
 }
 
 static Status find_flow_after(Solver *s) {
-    struct Saltation *x = s->saltation;
+    struct Saltation *x = s->part.columns;
     state_gather(s->system, s->state.q, s->state.v, x->there);
     return saltation_flow(s, s->state.now.t, x->there, x->flow_after);
 }
 
 /* What is known without differences of an event: its time, and where it was; nothing moves at once. */
 static void take_what_is_known(const Solver *s, int c) {
-    struct Saltation *x = s->saltation;
+    struct Saltation *x = s->part.columns;
     const System *system = s->system;
     const size_t bytes = (size_t)system->nq * sizeof(double);
     int events = 0;
@@ -118,7 +118,7 @@ static void take_what_is_known(const Solver *s, int c) {
 
 /* The columns behind a map that has just been done, x->found, from those before it. */
 static Status find_columns(Solver *s, const Jump *jump) {
-    struct Saltation *x = s->saltation;
+    struct Saltation *x = s->part.columns;
     const int n = system_states(s->system), size = column_size(s->system);
     const size_t bytes = (size_t)size * sizeof(double);
     const Numbers now = s->state.now;
@@ -140,7 +140,7 @@ static Status find_columns(Solver *s, const Jump *jump) {
 
 /* The columns that were found are those of the state; S+ = ... - phi+ dt_e/dp. */
 static void take_columns(Solver *s) {
-    struct Saltation *x = s->saltation;
+    struct Saltation *x = s->part.columns;
     const int n = system_states(s->system), size = column_size(s->system);
     for (int c = 0; c < s->columns; c++) {
         double *column = column_at(s, c);
@@ -150,7 +150,7 @@ static void take_columns(Solver *s) {
 }
 
 static void keep_before(Solver *s) {
-    struct Saltation *x = s->saltation;
+    struct Saltation *x = s->part.columns;
     memcpy(x->before, s->state.block, s->state.block_size);
     memcpy(x->columns, s->state.variation, (size_t)(s->columns * column_size(s->system)) * sizeof *x->columns);
     saltation_gather(s, x->from);
@@ -158,7 +158,7 @@ static void keep_before(Solver *s) {
 }
 
 static void no_flow(Solver *s) {
-    struct Saltation *x = s->saltation;
+    struct Saltation *x = s->part.columns;
     for (int j = 0; j < system_states(s->system); j++) x->flow_before[j] = x->flow_after[j] = 0;
     for (int c = 0; c < s->columns; c++) x->dt[c] = 0;
     x->limit = -1;
@@ -179,7 +179,7 @@ static void name_event(Solver *s, const char *why) {
     const char *kind;
     (void)fail(&s->why, "the event at t = %s s", digits(s->state.now.t).text);
     for (int i = 0; i < indicators_count(s->system); i++) {
-        if (!s->saltation->passed[i]) continue;
+        if (!s->part.columns->passed[i]) continue;
         const char *name = limit_name(s->system, i, &kind);
         why_append(&s->why, ", %s%s%s%s", kind, name[0] != '\0' ? " '" : "", name, name[0] != '\0' ? "'" : "");
     }
@@ -194,7 +194,7 @@ static Status find_speeds_of_gaps(Solver *s, double t, const double *y) {
     const double *v = y + system->nq;
     if (mechanism_evaluate(b, segment_instant(s, t), y, v) != OK) return FAILED;
     for (int c = 0; c < system->contacts; c++)
-        if (!s->state.closed[c]) s->saltation->speed[c] = mechanism_slip(b, system->contact[c], v);
+        if (!s->state.closed[c]) s->part.columns->speed[c] = mechanism_slip(b, system->contact[c], v);
     return OK;
 }
 
@@ -202,14 +202,14 @@ static void find_changes_of_gaps(Solver *s, double t, const double *y, int c) {
     const System *system = s->system;
     saltation_values_along(s, segment_instant(s, t), y, column_at(s, c), s->column[c].parameter);
     for (int i = 0; i < system->contacts; i++)
-        if (!s->state.closed[i]) s->saltation->slope[i] = s->sensitivity.df[system->contact[i]];
+        if (!s->state.closed[i]) s->part.columns->slope[i] = s->sensitivity.df[system->contact[i]];
 }
 
 /* The limits that have been left are passed, and so are, if a contact lands, the open ones that touch then, to
  * rounding: they are struck with it (modes.c). */
 static void find_struck(Solver *s) {
     const System *system = s->system;
-    struct Saltation *x = s->saltation;
+    struct Saltation *x = s->part.columns;
     int lands = 0;
     for (int c = 0; c < system->contacts; c++) lands |= x->passed[c] && !s->state.closed[c];
     for (int c = 0; c < system->contacts && lands; c++)
@@ -219,7 +219,7 @@ static void find_struck(Solver *s) {
 /* dt of column c for limit i, which is passed: whether it is that of the quickest.  An integration has left
  * `tolerance` of the motion's own speed, of which one that is passed slowly has little. */
 static int alike(const Solver *s, int c, int i, double dt) {
-    const struct Saltation *x = s->saltation;
+    const struct Saltation *x = s->part.columns;
     const Column *column = &s->column[c];
     const int parameter = column->parameter;
     const double natural = natural_pace(s), slowly = fmax(1, fabs(x->bend[i] / x->speed[i]) / natural);
@@ -232,7 +232,7 @@ static int alike(const Solver *s, int c, int i, double dt) {
 /* dt of the event's time for each column, by the limits that are passed. */
 static Status find_times(Solver *s, double t, const double *y) {
     const int watched = indicators_count(s->system);
-    struct Saltation *x = s->saltation;
+    struct Saltation *x = s->part.columns;
     const double natural = natural_pace(s);
     double least = HUGE_VAL;
     if (indicators_at(s, t, y, x->level) != OK) return FAILED;
@@ -266,7 +266,7 @@ static Status find_times(Solver *s, double t, const double *y) {
 }
 
 Status saltation_pass(Solver *s, Map map) {
-    struct Saltation *x = s->saltation;
+    struct Saltation *x = s->part.columns;
     const Jump jump = {map, NULL, s->state.now, 0};
     if (!*s->state.varied) return map(s, NULL, 0, 0);
     keep_before(s);
@@ -308,7 +308,7 @@ Status saltation_jump(Solver *s, Map map) {
 
 Status saltation_start(Solver *s, Map map, void *context) {
     const Jump jump = {map, context, s->state.now, 1};
-    struct Saltation *x = s->saltation;
+    struct Saltation *x = s->part.columns;
     keep_before(s);
     no_flow(s);
     x->ended.text[0] = '\0';

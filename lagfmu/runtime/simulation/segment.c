@@ -41,7 +41,7 @@ void segment_choose_rows(Solver *s) {
 void segment_inputs(const Solver *s, double t, double *u) {
     if (s->system->inputs == 0) return;
     drive_at(s->system, &s->drive, t, u);
-    if (s->supply != NULL) s->supply(s->caller, t, u);
+    if (s->caller.supply != NULL) s->caller.supply(s->caller.own, t, u);
 }
 
 Instant segment_instant(Solver *s, double t) {
@@ -78,7 +78,7 @@ static Status rate_of_state(void *context, double t, const double *y, double *dy
     if (status == OK && s->columns > 0) OPTIONAL.variation->rates(s, t, y, dydt + nq + nv);
     s->stepped.stage = 0;
     if (status != OK) return FAILED;
-    if (OPTIONAL.passage != NULL) s->narrowest = fmin(s->narrowest, s->apart = linear_apart(&s->stepped.linear));
+    if (OPTIONAL.passage != NULL) s->stages.narrowest = fmin(s->stages.narrowest, s->stages.apart = linear_apart(&s->stepped.linear));
     find_rates(s, y, dydt);
     for (int i = 0; i < nv; i++) dydt[nq + i] = s->stepped.vdot[i];
     return OK;
@@ -89,7 +89,7 @@ static Status plain_rate(void *context, double t, const double *y, double *dydt)
     Solver *s = context;
     const int nq = s->system->nq;
     if (!s->system->accelerate(t, y, y + nq, s->u, s->p, dydt + nq)) return rate_of_state(context, t, y, dydt);
-    s->apart = 1;
+    s->stages.apart = 1;
     mechanism_kinematics(&s->stepped, (Instant){t, s->u, s->p}, y);
     find_rates(s, y, dydt);
     return OK;
@@ -174,7 +174,7 @@ static Status accept(Solver *s, Integrator *i) {
 }
 
 Status segment_step(Solver *s, Integrator *i, double t_bound, double longest) {
-    s->narrowest = s->apart = 1;
+    s->stages.narrowest = s->stages.apart = 1;
     if (s->settings.method != RATTLE && accept(s, i) != OK) return FAILED;
     const Control c = control(s, i, longest);
     if (s->settings.method == RATTLE) {

@@ -3,6 +3,7 @@
 
 #include <string.h>
 
+#include "stick_slip.h"
 #include "friction.h"
 #include "nominals.h"
 #include "segment.h"
@@ -59,7 +60,7 @@ static const double WEIGHTS[] = {0.2369268850561891, 0.4786286704993665, 0.56888
 Status slip_work(Solver *s, double t0, double t1, double *lost) {
     const struct FrictionForces *f = s->stepped.friction;
     const Integrator *integrator = &s->integrator;
-    double *y = s->work_friction + 2 * s->system->frictions;
+    double *y = s->part.frictions->work + 2 * s->system->frictions;
     int slipping = 0;
     *lost = 0;
     for (int i = 0; i < s->system->frictions; i++) slipping |= !s->state.stick_slip[i].sticks;
@@ -107,7 +108,7 @@ static Status rate(Solver *s, double t, const double *y, double *dydt) {
 Status slip_jacobian(Solver *s, double t, const double *y, double *J, double *dfdt) {
     const double part = 1.4901161193847656e-8; /* 2^-26: half of a double's digits */
     const int nq = s->system->nq, ny = system_states(s->system), own = s->system->kinematics == NULL;
-    double *moved = s->work_friction + 2 * s->system->frictions, *at = moved + ny, *there = at + ny;
+    double *moved = s->part.frictions->work + 2 * s->system->frictions, *at = moved + ny, *there = at + ny;
     if (rate(s, t, y, at) != OK) return FAILED;
     memset(J, 0, (size_t)ny * (size_t)ny * sizeof *J);
     memset(dfdt, 0, (size_t)nq * sizeof *dfdt);

@@ -37,19 +37,43 @@ typedef struct {
     int parameter, state;
 } Column;
 
+/* What the caller does within a step; NULL: nothing.  The inputs at a time, those that are not by their polynomials:
+ * u (inputs).  Between two steps, at the state of now: t_end may come nearer, and nothing else changes. */
+typedef struct {
+    void *own;
+    void (*supply)(void *own, double t, double *u);
+    void (*pause)(void *own, double *t_end);
+} Caller;
+
+/* linear_apart() at the latest stage, and the least of a step. */
+typedef struct {
+    double apart, narrowest;
+} Stages;
+
+/* The memory of the parts of a simulation, each laid out and known by its own files alone; NULL where the FMU holds no such
+ * part.  Nothing in it is kept from one call of the solver to the next. */
+typedef struct {
+    struct StartMemory *start;       /* initial_projection.h */
+    struct JointSearch *joints;      /* joint_coordinates.h */
+    struct NominalsMemory *nominals; /* nominals.c */
+    struct AdvanceMemory *advance;   /* advance.c */
+    struct SearchMemory *search;     /* event_search.h */
+    struct LossesMemory *losses;     /* losses.c */
+    struct ContactMemory *contacts;  /* contacts.h */
+    struct FrictionMemory *frictions; /* stick_slip.h */
+    struct SwitchMemory *switches;   /* switches.c */
+    struct PassageMemory *passage;   /* passage.c */
+    struct CrossingMemory *crossing; /* crossing.c */
+    struct Saltation *columns;       /* saltation.h */
+} Parts;
+
 typedef struct Solver {
     const System *system;
     Settings settings;
     double stop_time;          /* [s]; infinite if it is not defined: never stepped past */
     int on_demand;             /* 1: q and v between two steps are found when the caller asks: solver_arrive() */
     Halt halt;
-    double crowd_since;        /* [s] events one upon the other: when they began, ... */
-    int crowd;                 /* ... and how many there are */
-    /* What the caller does within a step; NULL: nothing.  The inputs at a time, those that are not by their
-     * polynomials: u (inputs).  Between two steps, at the state of now: t_end may come nearer, and nothing else changes. */
-    void (*supply)(void *caller, double t, double *u);
-    void (*pause)(void *caller, double *t_end);
-    void *caller;
+    Caller caller;
     double limit;              /* [s] of a step, of the finer run of error bars (bars.h); 0: none */
     double first, taken;       /* [s] the first and the longest step that led to the communication point */
     State state;
@@ -57,8 +81,7 @@ typedef struct Solver {
     double *p;                 /* (parameters) */
     Mechanism stepped, full;   /* full: of an embedding; otherwise unused */
     Integrator integrator, probe; /* probe: integrates again from the last accepted point */
-    int *active;               /* (m) rows that act in the present modes */
-    Priority *moves;           /* (nv) of the start: priority_moves() */
+    int *active, *active_full; /* (m) rows that act in the present modes; (m of full) there */
     double *scale;             /* (states) of errors, in the present step */
     double *u;                 /* (inputs, then switches) at the time of the latest evaluation */
     Sensitivity sensitivity;   /* of `stepped` */
@@ -66,32 +89,8 @@ typedef struct Solver {
     void *own[8];              /* what each keeps (FEATURES_MOST) */
     int columns;               /* how many columns of derivatives go with the state (variation.h), and ... */
     const Column *column;      /* (columns) ... by what; both are set before the layout */
-    struct Saltation *saltation; /* of saltation.c; NULL without columns */
-    double *push;              /* (contacts) impulse of the impacts of the present instant [of lambda times s] */
-    /* scratch, nothing of which is kept from one call to the next: */
-    int *active_full;          /* (m of full) rows that act there */
-    double *work_initial;      /* (6 nq + 3 m) of initialization.c, initial_projection.c and nominals.c */
-    struct JointSearch *joint_search; /* of joint_start.c */
-    int *iwork_initial;        /* (2 m + contacts) */
-    double *work_contacts;     /* (2 nv + 3 m) of contacts.c */
-    int *iwork_contacts;       /* (m + 2 contacts) */
-    double *work_switches;     /* (2 switches + states + nq) of switches.c */
-    double apart, narrowest;   /* linear_apart() at the latest stage, and the least of a step */
-    double *work_passage;      /* (solver_width()) of passage.c */
-    double *work_crossing;     /* (solver_width() + 2 m + 3 nv) of crossing.c */
-    double *work_advance;      /* (2 solver_width()) of advance.c and exchange.c */
-    double *work_pause;        /* (solver_width()) */
-    double *work_events;       /* (3 solver_width() + indicators and all samples) of events.c and exchange_gain.c */
-    double *work_gap;    /* of minimum_gap.c */
-    double *work_frictional;   /* of frictional_impact.c */
-    int *iwork_frictional;
-    StickSlip *trial_modes;    /* (frictions) of stick_slip.c, with */
-    double *work_friction;     /* (2 frictions + 3 solver_width()) */
-    int *iwork_friction;       /* (4 frictions + 2 contacts) */
-    int *iwork_events;         /* (8 contacts) of events.c and modes.c */
-    double *work_modes;        /* (m + nv) of modes.c */
-    double *work_impact;       /* of impact.c, see there */
-    int *iwork_impact;
+    Stages stages;
+    Parts part;
     Why passed;                /* singular configurations passed since the caller emptied it, as a sentence */
     Why why;
 } Solver;
@@ -121,6 +120,8 @@ SHARED Status solver_start(Solver *s, double t, const double *q0, const double *
 
 /* No state yet: at t [s], with nothing in it.  For a start that was refused. */
 SHARED void solver_clear(Solver *s, double t);
+
+SHARED void advance_layout(Solver *s, Arena *scratch);
 
 /* advance.c -- from state.now.t to t_end [s], or as far as `halt` says.  FAILED leaves the state in disorder: the
  * caller puts the saved one back (it keeps a copy). */

@@ -11,6 +11,7 @@
 #include <float.h>
 #include <string.h>
 
+#include "contacts.h"
 #include "digits.h"
 #include "numbers.h"
 #include "optional.h"
@@ -36,7 +37,7 @@ void stick_slip_set_noise(Solver *s, const double *speed, StickSlip *modes) {
 /* Of the G that was evaluated last.  Where a slip ends, it is rounding of the speed at which the step began. */
 void stick_slip_renew_noise(Solver *s, StickSlip *modes) {
     const double *before = s->integrator.y_old + s->system->nq;
-    double *speed = s->work_contacts;
+    double *speed = s->part.contacts->forces;
     for (int j = 0; j < s->system->nv; j++)
         speed[j] = fmax(fmax(fabs(s->state.v[j]), fabs(before[j])),
                         sqrt(s->state.span[j]) * sqrt(s->state.felt[j]));
@@ -97,7 +98,7 @@ static double rate_of_row(const Mechanism *b, int k, const double *reach, double
 static Status find_slip_rate(Settling *x, int i, double rate[2], double *floor) {
     const Friction *law = &x->s->system->friction[i];
     if (motion_of_modes(x) != OK) return FAILED;
-    double *forces = x->s->work_contacts, *reach = forces + x->s->system->nv;
+    double *forces = x->s->part.contacts->forces, *reach = x->s->part.contacts->reach;
     mechanism_at_work(&x->s->stepped, forces, reach);
     rate[1] = *floor = 0;
     for (int r = 0; r < law->rows; r++) {
@@ -363,7 +364,7 @@ static int fits(Settling *x, int *trial, const int *touching, const int *departi
     const size_t bytes = (size_t)s->system->contacts * sizeof *trial;
     int *settled = trial + s->system->contacts;
     memcpy(settled, trial, bytes);
-    return OPTIONAL.contacts_modes(s, x->at, s->state.q, s->state.v, settled, touching, departing) == OK &&
+    return OPTIONAL.contacts->modes(s, x->at, s->state.q, s->state.v, settled, touching, departing) == OK &&
            memcmp(settled, trial, bytes) == 0;
 }
 
@@ -387,7 +388,7 @@ static int turn_contacts(const System *s, int i, int shut, int *closed, const in
 static int departs(const Settling *x, int i, const int *touching) {
     const System *s = x->s->system;
     const Friction *law = &s->friction[i];
-    double *forces = x->s->work_contacts, *reach = forces + x->s->system->nv;
+    double *forces = x->s->part.contacts->forces, *reach = x->s->part.contacts->reach;
     mechanism_at_work(&x->s->stepped, forces, reach);
     for (int c = 0; c < s->contacts; c++)
         for (int k = law->first; k < law->first + law->normals; k++) {
@@ -404,7 +405,7 @@ static Status check_still(Settling *x, const int *closed, const int *touching, c
     Solver *s = x->s;
     const System *system = s->system;
     struct FrictionForces *f = s->stepped.friction;
-    int *trial = s->iwork_friction + 4 * system->frictions, any = 0;
+    int *trial = s->part.frictions->flags + 4 * system->frictions, any = 0;
     for (int i = 0; i < system->frictions; i++) {
         const StickSlip held = x->modes[i];
         const int on = f->loaded[i];
@@ -438,7 +439,7 @@ Status stick_slip_settle(Settling *x, int *closed, const int *ended, const int *
                      const int *departing) {
     Solver *s = x->s;
     const size_t bytes = (size_t)s->system->contacts * sizeof *closed;
-    int *active = s->active, *before = s->iwork_friction + 4 * s->system->frictions;
+    int *active = s->active, *before = s->part.frictions->flags + 4 * s->system->frictions;
     x->active = active;
     for (int round = 0; round < FRICTION_ROUNDS; round++) {
         system_active(s->system, closed, active);
@@ -446,7 +447,7 @@ Status stick_slip_settle(Settling *x, int *closed, const int *ended, const int *
         for (int i = 0; i < s->system->frictions; i++) x->modes[i].held = s->stepped.friction->held[i];
         memcpy(before, closed, bytes);
         if (s->system->contacts == 0) return OK;
-        if (OPTIONAL.contacts_modes(s, x->at, s->state.q, s->state.v, closed, touching, departing) != OK)
+        if (OPTIONAL.contacts->modes(s, x->at, s->state.q, s->state.v, closed, touching, departing) != OK)
             return FAILED;
         if (memcmp(before, closed, bytes) == 0) return check_still(x, closed, touching, departing);
     }
@@ -458,8 +459,8 @@ Status stick_slip_settle(Settling *x, int *closed, const int *ended, const int *
 
 Settling stick_slip_try(Solver *s, Instant at) {
     const int count = s->system->frictions;
-    int *work = s->iwork_friction;
-    Settling x = {s, at, NULL, s->trial_modes, work, work + count, work + 2 * count, s->work_friction};
+    int *work = s->part.frictions->flags;
+    Settling x = {s, at, NULL, s->part.frictions->trial, work, work + count, work + 2 * count, s->part.frictions->work};
     memset(work, 0, (size_t)(3 * count) * sizeof *work);
     memcpy(x.modes, s->state.stick_slip, (size_t)count * sizeof *x.modes);
     s->stepped.friction->stick_slip = x.modes;

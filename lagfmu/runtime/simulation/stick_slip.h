@@ -8,6 +8,14 @@
 
 static const double FRICTION_JUMP = 1e3; /* times the noise: a slip velocity that no rounding makes */
 
+struct FrictionMemory {
+    StickSlip *trial; /* (frictions) modes */
+    double *work;     /* (2 frictions + 3 solver_width()) of stick_slip.c, slip.c and friction_events.c */
+    int *flags;       /* (4 frictions + 2 contacts) */
+    double *impact;   /* (frictional_impact_doubles()) of frictional_impact.c */
+    int *struck;      /* (frictional_impact_ints()) */
+};
+
 /* Frictions at s = 0, settled together; contacts as in `active`. */
 typedef struct {
     Solver *s;

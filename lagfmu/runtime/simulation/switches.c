@@ -4,6 +4,24 @@
 #include <math.h>
 #include <string.h>
 
+struct SwitchMemory {
+    double *h, *ahead;     /* (switches) of all surfaces, now and a little later; ... */
+    double *later, *speed; /* (nq), (nv) ... where the motion is then, and by which speeds; ... */
+    double *rate;          /* (nq) ... q' with these */
+};
+
+static void switches_layout(Solver *s, Arena *scratch) {
+    const System *of = s->system;
+    struct SwitchMemory counted, *x = arena_take(scratch, 1, sizeof *x);
+    s->part.switches = x;
+    if (x == NULL) x = &counted;
+    x->h = arena_doubles(scratch, of->switches);
+    x->ahead = arena_doubles(scratch, of->switches);
+    x->later = arena_doubles(scratch, of->nq);
+    x->speed = arena_doubles(scratch, of->nv);
+    x->rate = arena_doubles(scratch, of->nq);
+}
+
 static double switch_state_of(double h, int at_integers) {
     return at_integers ? floor(h) + 0.5 : (double)((h > 0) - (h < 0));
 }
@@ -15,8 +33,7 @@ static void look_ahead(Solver *s, Instant at, const double *q, const double *v, 
                        double *ahead) {
     const System *system = s->system;
     const double soon = fmax(SOON / (s->state.now.rate > 0 ? s->state.now.rate : 1), SOON * SOON * fabs(at.t));
-    double *later = ahead + system->switches;
-    double *speed = later + system->nq, *rate = speed + system->nv;
+    double *later = s->part.switches->later, *speed = s->part.switches->speed, *rate = s->part.switches->rate;
     for (int i = 0; i < system->nv; i++) speed[i] = v[i] + (vdot == NULL ? 0 : soon * vdot[i] / 2);
     mechanism_kinematics(&s->stepped, at, q);
     mechanism_rates(&s->stepped, speed, rate);
@@ -29,7 +46,7 @@ static int is_on(double h, int at_integers) { return at_integers ? h == floor(h)
 static void settle_switches(Solver *s, Instant at, const double *q, const double *v, const double *vdot,
                           int *changed) {
     const System *system = s->system;
-    double *h = s->work_switches, *ahead = h + system->switches;
+    double *h = s->part.switches->h, *ahead = s->part.switches->ahead;
     int any = 0;
     if (changed != NULL) *changed = 0;
     system->surfaces(at.t, q, at.u, at.p, h);
@@ -46,10 +63,10 @@ static void settle_switches(Solver *s, Instant at, const double *q, const double
 
 static int stale(Solver *s, Instant at, const double *q) {
     const System *system = s->system;
-    system->surfaces(at.t, q, at.u, at.p, s->work_switches);
+    system->surfaces(at.t, q, at.u, at.p, s->part.switches->h);
     for (int k = 0; k < system->switches; k++)
-        if (!is_on(s->work_switches[k], system->at_integers[k]) &&
-            switch_state_of(s->work_switches[k], system->at_integers[k]) != s->state.switch_state[k])
+        if (!is_on(s->part.switches->h[k], system->at_integers[k]) &&
+            switch_state_of(s->part.switches->h[k], system->at_integers[k]) != s->state.switch_state[k])
             return 1;
     return 0;
 }
@@ -67,4 +84,4 @@ static Range range(const Solver *s, int k) {
     return (Range){state >= 0 ? 0 : -HUGE_VAL, state <= 0 ? 0 : HUGE_VAL, 0, 0};
 }
 
-SHARED_VALUE const Switches SWITCHES = {settle_switches, stale, pass_surface, range};
+SHARED_VALUE const Switches SWITCHES = {switches_layout, settle_switches, stale, pass_surface, range};

@@ -16,6 +16,7 @@
 
 /* Reached by OPTIONAL (optional.h) where forces jump. */
 typedef struct {
+    void (*layout)(Solver *s, Arena *scratch);
     /* The states that belong to h at (at, q), state.switch_state and those behind the inputs in s->u alike; on a
      * surface that of the side to which the motion goes with v and vdot (may be NULL).  `changed` (may be
      * NULL): 1 if one is not what it was. */

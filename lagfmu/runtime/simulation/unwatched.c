@@ -24,7 +24,7 @@ static const double NO_TIME = 1e-10; /* natural times */
 static Status acceleration_within(Solver *s, const Integrator *i, const double *f1, double a, int k, double *value) {
     const int nq = s->system->nq;
     const double b = 1 - a, h = i->t - i->t_old;
-    double *y = s->saltation->there;
+    double *y = s->part.columns->there;
     for (int j = 0; j < system_states(s->system); j++)
         y[j] = b * b * ((1 + 2 * a) * i->y_old[j] + a * h * i->f_old[j]) +
                a * a * ((1 + 2 * b) * i->y[j] - b * h * f1[j]);
@@ -59,7 +59,7 @@ void unwatched_look(Solver *s) {
     if (!*s->state.varied || s->state.now.approach.near || s->state.now.event_count > 0) return;
     const double *f1 = i->dense + (method->last_stage + 1) * i->ny;
     if (method->last_stage == 0) {
-        double *rates = s->saltation->change;
+        double *rates = s->part.columns->change;
         if (segment_motion(s, segment_instant(s, i->t), i->y, i->y + nq) != OK) return;
         mechanism_rates(&s->stepped, i->y + nq, rates);
         for (int k = 0; k < s->system->nv; k++) rates[nq + k] = s->stepped.vdot[k];
