@@ -31,7 +31,7 @@ static void set_multiplier(Instance *x, const Variable *v, double value) {
     x->imposed = 1;
     x->multiplier[v->index] = value;
     x->gain = 0;
-    x->observed = x->evaluated = 0;
+    x->version += 1;
     apply_multipliers(x);
 }
 

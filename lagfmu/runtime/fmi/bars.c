@@ -88,7 +88,6 @@ static void start_bars(Instance *x) {
     memset(b->worst, 0, bars);
     memset(b->size, 0, bars);
     *b->lost = 0;
-    b->observed = 0;
 }
 
 static void lose_bars(Instance *x, const char *why) {
@@ -104,7 +103,6 @@ static void lose_bars(Instance *x, const char *why) {
 
 static void follow_delivered(Instance *x, double t_end) {
     Bars *b = x->bars;
-    b->observed = 0;
     if (*b->lost) return;
     share_settings(x);
     if (b->solver.state.now.steps == 0 && !has_fixed_step(x))
@@ -120,7 +118,6 @@ static void inputs_changed(Instance *x) {
 /* A look at the state with which the next step begins; one that cannot be found is told by that step. */
 static void turn(Instance *x) {
     Bars *b = x->bars;
-    b->observed = 0;
     if (*b->lost) return;
     share_settings(x);
     *b->lost = solver_look(&b->solver) != OK;
@@ -176,10 +173,10 @@ static void measure_difference(Instance *x) {
 static Status observe_both(Instance *x) {
     Bars *b = x->bars;
     if (instance_observe(x) != OK) return FAILED;
-    if (*b->lost || b->observed) return OK;
+    if (*b->lost || b->observed == x->version) return OK;
     share_settings(x);
     if (solver_arrive(&b->solver) == OK && solver_observe(&b->solver, &b->seen) == OK) {
-        b->observed = 1;
+        b->observed = x->version;
         measure_difference(x);
     } else {
         lose_bars(x, b->solver.why.text);
@@ -284,7 +281,6 @@ static void save(const Instance *x) {
 static void restore(Instance *x) {
     Bars *b = x->bars;
     b->solver.state.now = *b->kept;
-    b->observed = 0;
 }
 
 static Status restored_bars(Instance *x) {

@@ -25,12 +25,12 @@ struct Instance;
 
 typedef struct {
     Solver solver;    /* the finer run; its inputs and parameters are the delivered run's own */
-    Observed seen;    /* what can be read at its state, while `observed` is 1, and then: */
+    unsigned long observed; /* the version of the instance of which the following was found */
+    Observed seen;    /* what can be read at its state, and with it: */
     double *state, *scale; /* (states) q, v of the delivered run, and below which rounding of them is absolute */
     double *push;     /* (nv of the full system) of the magnitudes of all constraints' forces */
     double apart;     /* the largest relative difference of the two states */
     int paired;       /* both runs have met the same events */
-    int observed;
     int first, end;   /* the bars' positions among the variables, where they stand together */
     /* saved with the instance: */
     Numbers *kept;    /* the finer run's numbers, from instance_save() on */

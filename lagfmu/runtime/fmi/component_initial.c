@@ -38,7 +38,8 @@ static void put_setting(Instance *x, const Variable *v, double value) {
         return;
     }
     x->start_time = value;
-    x->started = x->observed = x->evaluated = 0;
+    x->started = 0;
+    x->version += 1;
 }
 
 /* How much a known is: its value, else the size of the coordinate or speed, else 1. */

@@ -15,7 +15,7 @@
 struct Derived {
     double *value;   /* (end[COLUMN_COUNT - 1] - first) of the variables that are derivatives, column by column */
     int first, *end; /* the position of the first, and (columns) the one behind the last of each */
-    int done;        /* 1: the values belong to the state that is observed */
+    unsigned long done; /* the version of the state that the values belong to */
     int moving;      /* 1: some are of the motion, not of what a state remembers */
     double *q, *v;   /* (nq), (nv) of the full system: of an event */
 };
@@ -69,8 +69,6 @@ static Status start_derivatives(Instance *x) {
     tell_of_end(x);
     return status;
 }
-
-static void forget(Instance *x) { x->derived->done = 0; }
 
 /* ------------------------------------------------------------------ values */
 
@@ -135,7 +133,7 @@ static Status derive(Instance *x) {
                 *value = 0; /* of a multiplier that is not unique */
         }
     }
-    all->done = 1;
+    all->done = x->version;
     return OK;
 }
 
@@ -154,7 +152,7 @@ static Status get_derivative(Instance *x, const Variable *v, double *value) {
     struct Derived *all = x->derived;
     const int at = (int)(v - VARIABLES) - all->first;
     *value = 0;
-    if (x->observed && all->done && v->place == AT_SENSITIVITY) {
+    if (all->done == x->version && v->place == AT_SENSITIVITY) {
         *value = all->value[at];
         return OK;
     }
@@ -164,9 +162,9 @@ static Status get_derivative(Instance *x, const Variable *v, double *value) {
         *value = 1;
         return OK;
     }
-    if (!all->done && derive(x) != OK) return FAILED;
+    if (all->done != x->version && derive(x) != OK) return FAILED;
     *value = all->value[at];
     return OK;
 }
 
-SHARED_VALUE const Derivatives OF_RUN = {of_peaks, &PEAK_CHANGES, layout_derivatives, start_derivatives, forget, get_derivative, tell_of_end};
+SHARED_VALUE const Derivatives OF_RUN = {of_peaks, &PEAK_CHANGES, layout_derivatives, start_derivatives, get_derivative, tell_of_end};

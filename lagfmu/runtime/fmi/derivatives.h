@@ -19,8 +19,6 @@ typedef struct {
     void (*layout)(struct Instance *x, Arena *scratch);
     /* Columns at the start that has been found. */
     Status (*start)(struct Instance *x);
-    /* What was derived belongs to a state that is no longer observed. */
-    void (*observed)(struct Instance *x);
     Status (*get)(struct Instance *x, const struct Variable *v, double *value);
     /* Why derivatives ended, once. */
     void (*tell)(struct Instance *x);

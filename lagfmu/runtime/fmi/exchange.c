@@ -31,7 +31,7 @@ void exchange_begin(Instance *x) {
 void exchange_set_time(Instance *x, double t) {
     Solver *s = &x->solver;
     const System *system = s->system;
-    if (s->state.now.t != t) x->observed = x->evaluated = 0;
+    if (s->state.now.t != t) x->version += 1;
     if (system->prescribed_count > 0) drive_at(system, &s->drive, t, x->expected);
     for (int i = 0; i < system->prescribed_count; i++) { /* what the importer drives it sets at each time */
         const int k = system->prescribed[i];
@@ -63,7 +63,7 @@ Status exchange_set_states(Instance *x, const double *states) {
     if (EXCHANGE_LOST) s->state.now.lost = states[nq + nv];
     for (int j = 0; j < nq; j++) s->state.q[j] = states[place_of(s->system, j)];
     for (int i = 0; i < nv; i++) s->state.v[i] = states[place_of(s->system, nq + i)];
-    x->observed = x->evaluated = 0;
+    x->version += 1;
     return instance_settle_states(x);
 }
 
@@ -96,12 +96,13 @@ Status exchange_nominals(Instance *x, double *nominals) {
 /* Accelerations and multipliers at the state. */
 Status exchange_evaluate(Instance *x) {
     Solver *s = &x->solver;
-    if (x->evaluated) return OK;
+    if (x->evaluated == x->version && x->evaluations == s->stepped.evaluations) return OK;
     if (instance_start(x) != OK) return FAILED;
     if (x->gain < 0 && exchange_find_gain(x) != OK) return FAILED;
     segment_begin(s);
     if (segment_motion(s, segment_instant(s, s->state.now.t), s->state.q, s->state.v) != OK) return FAILED;
-    x->evaluated = 1;
+    x->evaluated = x->version;
+    x->evaluations = s->stepped.evaluations;
     return OK;
 }
 
@@ -111,7 +112,6 @@ Status exchange_multipliers(Instance *x) {
     if (x->exchange && !s->state.now.dependent) return exchange_evaluate(x);
     if (instance_start(x) != OK) return FAILED;
     segment_begin(s);
-    x->evaluated = 0;
     return segment_motion_near(s, segment_instant(s, s->state.now.t), s->state.q, s->state.v);
 }
 
@@ -145,7 +145,6 @@ int exchange_leads_back(const Instance *x) {
 Status exchange_lead_back(Instance *x) {
     Solver *s = &x->solver;
     double *a = s->sensitivity.dvdot;
-    x->evaluated = 0;
     if (s->state.now.dependent && exchange_evaluate(x) != OK) return FAILED;
     if (s->state.now.dependent) memcpy(x->seen.vdot, s->stepped.vdot, (size_t)s->system->nv * sizeof *a);
     if (find_way_back(x, a, NULL) != OK) return FAILED;
@@ -181,7 +180,7 @@ static Status find_beside(Instance *x, Direction d, double h, double *vdot) {
     for (int i = 0; i < nv; i++) s->state.v[i] += h * d.dv[i];
     for (int k = 0; k < system->inputs; k++) s->drive.value[k] += h * d.du[k];
     s->state.now.t += h * d.dt;
-    x->evaluated = 0;
+    x->version += 1;
     Status status = mechanism_settle(&s->stepped, segment_instant(s, s->state.now.t), s->state.q);
     if (status == OK) status = exchange_evaluate(x);
     if (status == OK) memcpy(vdot, s->stepped.vdot, (size_t)nv * sizeof *vdot);
@@ -191,7 +190,7 @@ static Status find_beside(Instance *x, Direction d, double h, double *vdot) {
     state_scatter(system, y, s->state.q, s->state.v);
     memcpy(s->drive.value, u, (size_t)system->inputs * sizeof *u);
     s->state.now.t -= h * d.dt;
-    x->evaluated = 0;
+    x->version += 1;
     return status;
 }
 

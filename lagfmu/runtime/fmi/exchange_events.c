@@ -28,7 +28,7 @@ static Status choose_rows(Instance *x) {
     Solver *s = &x->solver;
     if (s->system->m < 2 || x->imposed) return OK;
     segment_begin(s);
-    x->evaluated = 0;
+    x->version += 1;
     if (segment_motion_near(s, segment_instant(s, s->state.now.t), s->state.q, s->state.v) != OK) return FAILED;
     segment_choose_rows(s);
     return OK;
@@ -118,7 +118,7 @@ static Status judge_step(Instance *x, int *event) {
 Status exchange_step_done(Instance *x, int *event) {
     if (instance_start(x) != OK) return FAILED;
     if (judge_step(x, event) != OK) return FAILED;
-    if (features_everywhere(&x->solver)) x->observed = x->evaluated = 0;
+    if (features_everywhere(&x->solver)) x->version += 1;
     FEATURES_DO(&x->solver, exchanged, &x->solver, event);
     return OK;
 }
@@ -131,11 +131,11 @@ static Status settle_jumps(Instance *x, int *changed) {
     *changed = 0;
     if (s->system->switches == 0) return OK;
     OPTIONAL.switches->settle(s, at, s->state.q, s->state.v, NULL, changed);
-    x->evaluated = 0;
+    x->version += 1;
     if (exchange_evaluate(x) != OK) return FAILED; /* what rests on a surface may be about to leave it */
     OPTIONAL.switches->settle(s, at, s->state.q, s->state.v, s->stepped.vdot, &again);
     *changed |= again;
-    x->evaluated = 0;
+    x->version += 1;
     return OK;
 }
 
@@ -143,7 +143,7 @@ static Status settle_jumps(Instance *x, int *changed) {
 static Status release(Instance *x, double drift) {
     Solver *s = &x->solver;
     if (s->system->contacts == 0) return OK;
-    x->evaluated = 0;
+    x->version += 1;
     return OPTIONAL.contacts->departures(s, SHORT / s->state.now.rate, drift);
 }
 
@@ -154,7 +154,7 @@ static Status project_state(Solver *s) {
 
 /* The state back onto the rows that act. */
 static Status project(Instance *x) {
-    x->observed = x->evaluated = 0;
+    x->version += 1;
     return x->solver.system->m == 0 || x->imposed ? OK : project_state(&x->solver);
 }
 
@@ -179,7 +179,7 @@ static Status pass_event(Instance *x) {
     if (find_happened(x, &any) != OK) return FAILED;
     if (any || jumped) x->moved = 1; /* some integrators begin anew only then, from beyond the event if they do not */
     if (!any && !(jumped && s->system->contacts + s->system->frictions > 0)) return OK;
-    x->evaluated = 0;
+    x->version += 1;
     if (s->system->frictions > 0 &&
         OPTIONAL.friction->stop(s, segment_instant(s, s->state.now.t),
                               x->happened + indicators_first_of_frictions(s->system)) != OK)
@@ -198,7 +198,7 @@ static Status moving(Instance *x, Status (*act)(Instance *)) {
     if (instance_start(x) != OK) return FAILED;
     state_gather(s->system, s->state.q, s->state.v, before);
     const double lost = s->state.now.lost;
-    x->observed = x->evaluated = 0;
+    x->version += 1;
     if (act(x) != OK) return FAILED;
     instance_settled(x);
     state_gather(s->system, s->state.q, s->state.v, after);
@@ -209,7 +209,7 @@ static Status moving(Instance *x, Status (*act)(Instance *)) {
 
 /* Features know both sides of an event. */
 static Status tell_features(Instance *x) {
-    if (features_everywhere(&x->solver)) x->observed = x->evaluated = 0;
+    if (features_everywhere(&x->solver)) x->version += 1;
     FEATURES_DO(&x->solver, after, &x->solver);
     return OK;
 }

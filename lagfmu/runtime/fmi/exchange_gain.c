@@ -118,7 +118,6 @@ Status exchange_find_gain(Instance *x) {
     x->gain = 0;
     if (s->system->m == 0 || x->imposed) return OK;
     segment_begin(s);
-    x->evaluated = 0;
     if (move(s, tried.rate) != OK) return FAILED;
     for (int j = 0; j < nq; j++) size[j] = s->state.size[j] > 0 ? s->state.size[j] : 1;
     for (int i = 0; i < nv; i++) {

@@ -73,7 +73,8 @@ void instance_reset(Instance *x) {
     x->tolerance = 0;
     x->given.method = (MethodName)DEFAULT_METHOD;
     x->solver.on_demand = 1;
-    x->started = x->running = x->warned = x->moved = x->ticking = x->observed = x->evaluated = x->followed = 0;
+    x->started = x->running = x->warned = x->moved = x->ticking = 0;
+    x->version += 1;
     x->imposed = x->unsettled = 0;
     instance_settled(x);
     if (ALGEBRAIC != NULL) ALGEBRAIC->apply(x);

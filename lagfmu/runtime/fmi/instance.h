@@ -48,8 +48,12 @@ typedef struct Instance {
     INSTANCE_NUMBERS(SAVED_MEMBER)
     Settings given;         /* solver.* as they were set; tolerance 0: not set */
     Between between;        /* context: that of tell() */
-    Observed seen;          /* what can be read at the state; belongs to it while `observed` is 1 */
-    unsigned long motion;   /* evaluations of the solver when it was observed */
+    /* What was found of the state holds as long as the version of which it was found is the one of now: */
+    unsigned long version;  /* raised by each change of the state, of inputs, modes and parameters */
+    unsigned long observed, evaluated; /* of `seen`; of the accelerations of exchange.c */
+    unsigned long motion, evaluations; /* ... while this was the solver's latest evaluation */
+    unsigned long followed; /* the state goes with a motion that was set; as it was in `backup` */
+    Observed seen;          /* what can be read at the state */
     Sensitivity along;      /* of the full system, where there is an embedding */
     Instant at;             /* of instance_factor() */
     Bars *bars;             /* error bars; NULL without */
@@ -59,13 +63,11 @@ typedef struct Instance {
     double *places;         /* (lookup_count) scratch */
     double *work;           /* (7 states) of exchange.c, exchange_events.c and exchange_gain.c */
     double *back;           /* (3 nv + m + inputs) of exchange.c: changes of vdot, what leads back onto the constraints */
-    int observed, evaluated;
     double *set_before;     /* (VARIABLE_COUNT) of component_initial.c */
     double *norm;           /* (quaternions) of those that an importer has set, before they were settled */
     int apart;              /* 1: along the direction accelerations change, but no multipliers satisfy all constraints */
     double dlost;           /* of a direction: the change of the energy dissipated, where that is a state */
     int unsettled;          /* 1: states were set one by one */
-    int followed;           /* 1: the state goes with a motion that was set; as it was in `backup` */
     double *q0, *v0;        /* (nq), (nv) start values as they were set */
     double *joint0;         /* (2 joint_count) those of joint coordinates and their rates */
     Priority *priority;     /* (system_starts()) who said them; found anew at each start */

@@ -71,7 +71,7 @@ int instance_event_happened(const Instance *x) {
 static Status at_once(Instance *x, Status (*act)(Solver *)) {
     instance_save(x, x->backup);
     instance_count_events(x);
-    x->observed = x->evaluated = 0;
+    x->version += 1;
     if (act(&x->solver) != OK) {
         instance_restore(x, x->backup);
         return FAILED;

@@ -31,14 +31,15 @@ void instance_restore(Instance *x, const char *record) {
     s->stop_time = head.stop_time;
     INSTANCE_NUMBERS(PUT)
     if (ALGEBRAIC != NULL) ALGEBRAIC->apply(x);
-    x->observed = x->evaluated = x->followed = x->unsettled = 0;
+    x->unsettled = 0;
+    x->version += 1;
     instance_settled(x);
     if (ERROR_BARS != NULL) ERROR_BARS->restore(x);
 }
 
 void instance_unfollow(Instance *x) {
     const int phase = x->phase;
-    if (!x->followed) return;
+    if (x->followed != x->version) return;
     instance_restore(x, x->backup);
     x->phase = phase;
 }

@@ -65,8 +65,16 @@ static void set_input(Instance *x, int k, double value) {
     renew_input(x, k);
     drive->value[k] = value;
     if (same) return;
-    x->observed = x->evaluated = 0;
+    x->version += 1;
     if (x->started) instance_inputs_changed(x);
+}
+
+/* The start depends on inputs, too. */
+static void set_input_or_start(Instance *x, int k, double value) {
+    set_input(x, k, value);
+    if (x->running) return;
+    x->started = 0;
+    x->version += 1;
 }
 
 void instance_set(Instance *x, const Variable *v, double value) {
@@ -76,11 +84,11 @@ void instance_set(Instance *x, const Variable *v, double value) {
         return;
     }
     if (v->place == AT_INPUT) {
-        set_input(x, v->index, value);
-        if (!x->running) x->started = x->observed = 0;
+        set_input_or_start(x, v->index, value);
         return;
     }
-    x->started = x->observed = x->evaluated = 0;
+    x->started = 0;
+    x->version += 1;
     if (v->role == ROLE_START) {
         *start_place(x, v->state) = value;
         return;
@@ -102,8 +110,7 @@ void instance_set_input_derivative(Instance *x, const Variable *v, int order, do
     int k = v->index;
     const int place = PRESCRIBED == NULL ? -1 : PRESCRIBED->order(x, k);
     if (place >= 0 && place + order <= 2) { /* that derivative is an input itself */
-        set_input(x, k + order, value);
-        if (!x->running) x->started = x->observed = 0;
+        set_input_or_start(x, k + order, value);
         return;
     }
     if (place >= 0) { /* der(u,2) goes on by those beyond it */
@@ -114,6 +121,6 @@ void instance_set_input_derivative(Instance *x, const Variable *v, int order, do
     double *where = order == 1 ? &drive->first[k] : &drive->second[k];
     if (*where == value) return;
     *where = value;
-    x->observed = x->evaluated = 0;
+    x->version += 1;
     if (x->started) instance_inputs_changed(x);
 }

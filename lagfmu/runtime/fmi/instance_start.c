@@ -164,7 +164,7 @@ Status instance_start(Instance *x) {
     memcpy(x->expected, s->drive.value, (size_t)s->system->inputs * sizeof *x->expected);
     x->started = 1;
     instance_warn_of_shares(x);
-    x->observed = x->evaluated = 0;
+    x->version += 1;
     x->gain = -1;
     if (ERROR_BARS != NULL) ERROR_BARS->start(x);
     return OK;

@@ -21,7 +21,7 @@ void instance_set_state(Instance *x, const Variable *v, double value) {
     if (j == system_states(x->solver.system)) state->now.lost = value;
     else
         *(j < nq ? &state->q[j] : &state->v[j - nq]) = value;
-    x->observed = x->evaluated = 0;
+    x->version += 1;
     x->unsettled = 1;
 }
 

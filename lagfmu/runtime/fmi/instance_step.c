@@ -73,7 +73,7 @@ static void supply(void *caller, double t, double *u) {
 /* It looks at the state, which is final; when the step is to end. */
 static double let_look(Instance *x, double end) {
     Between *between = &x->between;
-    x->observed = x->evaluated = 0;
+    x->version += 1;
     between->finished = x->solver.state.now.t;
     between->paused = 1;
     const double sooner = between->look(x->context, between->finished, end);
@@ -84,7 +84,7 @@ static double let_look(Instance *x, double end) {
 static void pause_step(void *caller, double *t_end) {
     Instance *x = caller;
     *t_end = let_look(x, *t_end);
-    x->observed = x->evaluated = 0;
+    x->version += 1;
 }
 
 static void open_step(Instance *x, double t_end) {
@@ -125,7 +125,7 @@ static void prepare_step(Instance *x, double t_end) {
     memcpy(x->expected, x->solver.drive.value, (size_t)x->solver.system->inputs * sizeof *x->expected);
     instance_count_events(x);
     if (ERROR_BARS != NULL) ERROR_BARS->begin_step(x, t_end);
-    x->observed = x->evaluated = 0;
+    x->version += 1;
     x->solver.passed.text[0] = '\0';
     open_step(x, t_end);
 }
@@ -153,7 +153,7 @@ Status instance_step(Instance *x, double t_end) {
     Solver *s = &x->solver;
     x->ticking = 0;
     if (solver_pass(s, t_end)) {
-        x->observed = x->evaluated = 0;
+        x->version += 1;
         if (ERROR_BARS != NULL) ERROR_BARS->follow(x, t_end);
         show_end(x);
         return OK;

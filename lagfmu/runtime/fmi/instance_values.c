@@ -12,13 +12,13 @@
 
 /* What is read after an input was set is read at the state with which the next step begins. */
 static Status follow(Instance *x) {
-    if (x->followed || x->exchange || !x->started || !x->running) return OK;
+    if (x->followed == x->version || x->exchange || !x->started || !x->running) return OK;
     if (x->solver.state.now.pending || x->between.paused) return OK; /* the limit from the left */
     const int estimated = PRESCRIBED != NULL && PRESCRIBED->was_set(x);
     if (!estimated && !instance_turned(x)) return OK;
     instance_save(x, x->backup);
-    x->followed = 1;
-    x->observed = x->evaluated = 0;
+    x->version += 1;
+    x->followed = x->version;
     if (estimated) PRESCRIBED->estimate(x);
     instance_turn(x);
     if (ERROR_BARS != NULL) ERROR_BARS->turn(x);
@@ -28,17 +28,14 @@ static Status follow(Instance *x) {
 }
 
 Status instance_observe(Instance *x) {
-    if (x->observed) return OK;
+    if (x->observed == x->version) return OK;
     if (instance_start(x) != OK || solver_arrive(&x->solver) != OK || follow(x) != OK) return FAILED;
     const int leads_back = exchange_leads_back(x);
     if (leads_back && x->gain < 0 && exchange_find_gain(x) != OK) return FAILED;
     if (solver_observe(&x->solver, &x->seen) != OK) return FAILED;
     x->motion = x->solver.stepped.evaluations + x->solver.full.evaluations;
     if (leads_back && exchange_lead_back(x) != OK) return FAILED;
-    x->observed = 1;
-    x->evaluated = 0;
-    if (DERIVATIVES != NULL) DERIVATIVES->observed(x);
-    if (ERROR_BARS != NULL) x->bars->observed = 0;
+    x->observed = x->version;
     return OK;
 }
 
@@ -137,6 +134,6 @@ Status instance_get(Instance *x, const Variable *v, double *value) {
     if (x->started && ready(&x->solver, v, value))
         return isfinite(*value) ? OK : fail(&x->solver.why, "%s is not finite", v->name);
     if (v->place == AT_OUTPUT_UNIQUE && instance_observe_unique(x) != OK) return FAILED;
-    if (!x->observed && instance_observe(x) != OK) return FAILED;
+    if (instance_observe(x) != OK) return FAILED;
     return instance_value(&x->solver, &x->seen, v, value);
 }

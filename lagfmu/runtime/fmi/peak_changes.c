@@ -45,12 +45,13 @@ static Status change_of_peaked(Solver *s, int c, double *changes) {
     Direction d;
     x->seen.asked = 1;
     if (solver_observe(s, &x->seen) != OK) return FAILED;
-    x->observed = 1; /* of this state, until it has been differentiated */
+    x->version += 1;
+    x->observed = x->version; /* until this state has been differentiated */
     Status status = c < 0 ? instance_rates(x, &d) : instance_factor(x);
     if (c >= 0 && status == OK) status = derivatives_along(x, c, &d);
     for (int k = 0; k < PEAK_COUNT && status == OK; k++)
         if (instance_change(x, &PEAKED[k], d, &changes[k]) != OK) changes[k] = 0;
-    x->observed = x->evaluated = 0;
+    x->version += 1;
     return status;
 }
 
