@@ -37,7 +37,11 @@ EPS = float(np.finfo(float).eps)
 
 @np.errstate(all="ignore")  # what is not finite is told
 def assemble(
-    draft: Draft, model: Model, parts: Sequence[Any], start: Mapping[str, Any]
+    draft: Draft,
+    model: Model,
+    parts: Sequence[Any],
+    start: Mapping[str, Any],
+    near: Mapping[str, Any],
 ) -> tuple[dict[Expr, float], list[Expr], dict[str, tuple[float, bool]]]:
     """The start of each coordinate and velocity, in SI, and those of them that nothing given speaks of; then
     that of each joint coordinate that is free, and of its rate, and whether it is given.
@@ -46,6 +50,7 @@ def assemble(
     """
     known = known_names(draft, model)
     given = given_values(draft, model, known, start)
+    hints = given_values(draft, model, known, near)
     places = {n: x for n, x in given.items() if not known[n].of_velocities}
     rates = {n: x for n, x in given.items() if known[n].of_velocities}
     acting = [
@@ -59,7 +64,7 @@ def assemble(
     held = Rows(model, [known[n][:2] for n in places])
     wanted = np.concatenate([np.zeros(len(closing)), np.array([*places.values()])])
     moving = moving_of(draft, model)
-    rough = moving.tied(guessed(draft, model, parts, places), places)
+    rough = moving.tied(guessed(draft, model, parts, {**hints, **places}), {**hints, **places})
     if problems := list(parallel(closing, f.values(rough))):
         raise ModelError(model.name, problems)
     size = moving.sized(rough)
@@ -90,7 +95,8 @@ def assemble(
         told = {
             n: e
             for n, e in measures.items()
-            if moving.determines([f, held], q, Rows(model, [draft.relative[n].values[:2]]))
+            if n not in hints
+            and moving.determines([f, held], q, Rows(model, [draft.relative[n].values[:2]]))
         }
         others = from_other_angles() if at_once else moving.closed_about([f, held], wanted, rough)
         tell_second_branch(model, told, others, rough, q)

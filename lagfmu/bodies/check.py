@@ -38,7 +38,7 @@ def problems_of_containers(lists: Mapping[str, object], dicts: Mapping[str, obje
     ]
     return problems + [
         f"{name} is {value!r}, expected a dict by names: {name}={{'{example}': ...}}"
-        for (name, value), example in zip(dicts.items(), ("angle.A", "tip"), strict=True)
+        for (name, value), example in zip(dicts.items(), ("angle.A", "angle.A", "tip"), strict=True)
         if not isinstance(value, Mapping) or not all(isinstance(key, str) for key in value)
     ]
 

@@ -36,6 +36,7 @@ def mechanism(
     contacts: Sequence[Any] = (),
     plane: str | None = None,
     start: Mapping[str, Any] | None = None,
+    near: Mapping[str, float] | None = None,
     read: Mapping[str, Any] | None = None,
     parameters: Sequence[Parameter] = (),
     inputs: Sequence[Input] = (),
@@ -46,8 +47,9 @@ def mechanism(
 
     `start` maps names of the FMU to where they begin: 'angle.A', 'der(angle.A)', 'rod.position.x', or
     'rod.position' to all of its components; in space 'rod.rpy' to roll, pitch and yaw [rad].  The rest is
-    assembled: what is omitted moves first.  `read` maps names to markers (to a body: its own frame), of which
-    the FMU then tells NAME.position.x, NAME.velocity.x, NAME.acceleration.x and, in space, NAME.rpy.roll.
+    assembled: what is omitted moves first, from where joint coordinates are `near`, else from 0.  `read` maps
+    names to markers (to a body: its own frame), of which the FMU then tells NAME.position.x, NAME.velocity.x,
+    NAME.acceleration.x and, in space, NAME.rpy.roll.
     `parameters`, `inputs`, `outputs` and `more` (a description, an author, a page) go to the Model as they
     are.
 
@@ -55,7 +57,9 @@ def mechanism(
     joint misses.
     """
     lists = {"bodies": bodies, "joints": joints, "loads": loads, "contacts": contacts}
-    problems = problems_of_containers(lists, {"start": start or {}, "read": read or {}})
+    problems = problems_of_containers(
+        lists, {"start": start or {}, "near": near or {}, "read": read or {}}
+    )
     if problems:
         raise ModelError(str(name), problems)
     parts = [*joints, *loads, *contacts, *readings_of(read or {}, plane is not None)]
@@ -67,7 +71,7 @@ def mechanism(
     draft.motions[Ground()] = motion(draft, Ground())
     for body in bodies:
         draft.motions[body] = motion(draft, body)
-    draft.wound = _wound(parts, start or {})
+    draft.wound = _wound(parts, {**(near or {}), **(start or {})})
     for part in sorted(parts, key=lambda part: isinstance(part, Gear)):
         part.add(draft)
     draft.report_wrenches()
@@ -99,7 +103,7 @@ def mechanism(
         laws=laws_of(draft, parts),
         **{"picture": picture_of(draft, parts), **more},
     )
-    started = model.started(*assemble(draft, model, parts, start or {}))
+    started = model.started(*assemble(draft, model, parts, start or {}, near or {}))
     if problems := coinciding(draft, started, parts):
         raise ModelError(str(name), problems)
     warn_of_radii(draft, parts)

@@ -41,6 +41,7 @@ SPHERE, CAPSULE, CYLINDER, BOX = 2, 3, 5, 6  # mjtGeom
 NO_GRAVITY = 1 << 7  # mjtDisableBit
 # transmission joint or joint in parent, no dynamics, a fixed gain, no bias or an affine one
 BY_JOINT = {(transmission, 0, 0, bias) for transmission in (0, 1) for bias in (0, 1)}
+OPEN = 1e-2  # m or rad: what an equality may miss at the start, written with few digits, untold
 SQUARE = 1e-9  # cosine of two axes that are square, and what two points may differ by, relative
 
 
@@ -48,8 +49,8 @@ SQUARE = 1e-9  # cosine of two axes that are square, and what two points may dif
 class MjcfParts:
     """What an MJCF file holds: `mechanism(parts.name, **parts.arguments)`, or its lists by themselves.
 
-    `loads` are gravity, springs, dampers, rotors and actuators; `frames` are the sites; `start` is the
-    configuration of the file, or a key frame of it.
+    `loads` are gravity, springs, dampers, rotors and actuators; `frames` are the sites; `start` and, of
+    joints that equalities tie, `near` are the configuration of the file, or a key frame of it.
     """
 
     name: str
@@ -59,19 +60,22 @@ class MjcfParts:
     loads: tuple[Any, ...]
     frames: dict[str, Marker]
     start: dict[str, Any]
+    near: dict[str, float]
     inputs: tuple[Input, ...]
     parameters: tuple[Parameter, ...]
 
     @property
     def arguments(self) -> dict[str, Any]:
         """Those of `mechanism`."""
-        names = ("bodies", "joints", "loads", "start", "inputs", "parameters")
+        names = ("bodies", "joints", "loads", "start", "near", "inputs", "parameters")
         return {name: getattr(self, name) for name in names}
 
 
-def from_mjcf(file: str | os.PathLike[str], limits: bool = True, key: str = "") -> MjcfParts:
+def from_mjcf(
+    file: str | os.PathLike[str], limits: bool = True, key: str = "", actuators: bool = True
+) -> MjcfParts:
     """The bodies, joints and loads of an MJCF file; without `limits` its joints do not stop where it says so;
-    `key` names the key frame at which it begins.
+    without `actuators` nothing drives them; `key` names the key frame at which it begins.
 
     Raises ModelError with every problem at once.  What MuJoCo has and this has not is told once, counted.
     """
@@ -87,14 +91,16 @@ def from_mjcf(file: str | os.PathLike[str], limits: bool = True, key: str = "") 
     except ValueError as error:
         text = " ".join(str(error).split())
         raise ModelError(path.name, [f"MuJoCo does not take it: {text}"]) from None
-    return _Reader(mujoco, m, path.stem, limits, key).parts()
+    return _Reader(mujoco, m, path.stem, limits, key, actuators).parts()
 
 
 class _Reader:
     """One compiled model."""
 
-    def __init__(self, mujoco: Any, m: Any, stem: str, limits: bool, key: str) -> None:
-        self.mj, self.m, self.limits = mujoco, m, limits
+    def __init__(
+        self, mujoco: Any, m: Any, stem: str, limits: bool, key: str, actuators: bool
+    ) -> None:
+        self.mj, self.m, self.limits, self.actuators = mujoco, m, limits, actuators
         self.problems: list[str] = []
         self.left: Counter[str] = Counter()
         self.taken: set[str] = {"ground"}
@@ -129,7 +135,9 @@ class _Reader:
         self._tell()
         parts = tuple(self.bodies.values()), tuple(joints), tuple(loads)
         more = tuple(self.inputs), tuple(self.parameters)
-        return MjcfParts(self.called, self.ground, *parts, frames, self._start(), *more)
+        start, tied = self._start(), self._tied()
+        near = {n: start.pop(n) for n in [*start] if n in tied}
+        return MjcfParts(self.called, self.ground, *parts, frames, start, near, *more)
 
     # ------------------------------------------------------------------ names
 
@@ -422,7 +430,7 @@ class _Reader:
     def _actuators(self) -> Iterator[Any]:
         """gain u + b0 + b1 (gear q) + b2 (gear q'), times the gear."""
         m = self.m
-        for a in range(m.nactuator):
+        for a in range(m.nactuator if self.actuators else 0):
             j, gear = int(m.actuator_trnid[a][0]), float(m.actuator_gear[a][0])
             kinds = m.actuator_trntype, m.actuator_dyntype, m.actuator_gaintype, m.actuator_biastype
             kind = tuple(int(of[a]) for of in kinds)
@@ -469,6 +477,15 @@ class _Reader:
         if self.key >= 0:
             data.qvel[:] = m.key_qvel[self.key]
         mj.mj_forward(m, data)
+        tied = data.efc_type == mj.mjtConstraint.mjCNSTR_EQUALITY
+        open_ = float(np.abs(data.efc_pos[tied]).max(initial=0.0))
+        if open_ > OPEN:
+            warnings.warn(
+                f"{self.called!r}: where the file begins its equalities miss by {open_:.3g} (m or rad): its "
+                "joints are closed near there",
+                LagfmuWarning,
+                stacklevel=5,
+            )
         found: dict[str, Any] = {}
         for j in range(m.njnt):
             b, q, d = int(m.jnt_bodyid[j]), int(m.jnt_qposadr[j]), int(m.jnt_dofadr[j])
@@ -486,6 +503,25 @@ class _Reader:
                 found[f"{body.name}.position"] = tuple((data.xpos[b] + arm).tolist())
                 found[f"{body.name}.velocity"] = tuple(velocity.tolist())
         return found
+
+    def _tied(self) -> set[str]:
+        """The coordinates of joints in loops, and of those that equalities tie."""
+        m, found = self.m, set()
+        for e in range(m.neq):
+            ends = int(m.eq_obj1id[e]), int(m.eq_obj2id[e])
+            if not m.eq_active0[e] or m.eq_type[e] not in (CONNECT, WELD, JOINT):
+                continue
+            if m.eq_type[e] == JOINT:
+                found |= {j for j in ends if j >= 0}
+                continue
+            ways = [self._way(m.site_bodyid[b] if m.eq_objtype[e] == SITE else b) for b in ends]
+            for b in ways[0] ^ ways[1]:
+                found |= {*range(m.body_jntadr[b], m.body_jntadr[b] + m.body_jntnum[b])}
+        return {self._measure(j) for j in found if m.jnt_type[j] in (SLIDE, HINGE)}
+
+    def _way(self, b: int) -> set[int]:
+        """A body and all that it hangs on."""
+        return {b, *self._way(self.m.body_parentid[b])} if b else set()
 
     def _tell(self) -> None:
         m = self.m

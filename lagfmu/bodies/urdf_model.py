@@ -4,18 +4,38 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
-from ..errors import ModelError, RequestError
+from ..errors import ModelError
 from ..model.model import Model
-from .joints import Gear, Joint
-from .loads import Gravity, Motor
+from .arguments import chosen, motors
+from .loads import Gravity
 from .mechanism import mechanism
 from .urdf import BASES, from_urdf
 
 GRAVITY = (0, 0, -9.81)  # m/s^2
-MOTORS: dict[str, dict[str, Any]] = {"none": {}, "torque": {}, "motion": {"motion": True}}
-CHOICES = {"base": BASES, "motors": tuple(MOTORS), "limits": ("true", "false")}
+CHOICES = {"base": BASES, "motors": ("none", "torque", "motion"), "limits": ("true", "false")}
+# The Python file that says the same.
+PYTHON = '''"""The robot of {file}.  Add motors, contacts and closed loops of your own, then:
+
+    lagfmu simulate {own} --plot out.svg
+"""
+
+from pathlib import Path
+
+from lagfmu import Scene
+from lagfmu.bodies import Gravity, from_urdf, mechanism
+
+robot = from_urdf(Path(__file__).parent / {path!r})
+model = mechanism(
+    robot.name,
+    bodies=robot.bodies,
+    joints=[*robot.joints],
+    loads=[Gravity((0, 0, -9.81)), *robot.loads],
+    start={{**robot.start}},  # e.g. "angle.j2": 0.5
+    description=robot.description,
+)
+scenes = [Scene(model.name, stop_time=1.0, step_size=0.01)]
+'''
 
 
 def read(path: Path, arguments: Sequence[str] = ()) -> Model:
@@ -25,48 +45,18 @@ def read(path: Path, arguments: Sequence[str] = ()) -> Model:
     With motors=torque each joint that follows no other has the input J_motor.torque (J_motor.force), with
     motors=motion J_motor.angle (J_motor.position).  Raises RequestError for arguments, ModelError.
     """
-    chosen, start = _chosen(path, arguments)
-    parts = from_urdf(path, limits=chosen["limits"] == "true", base=chosen["base"])
+    asked, given = chosen(path, arguments, CHOICES)
+    parts = from_urdf(path, limits=asked["limits"] == "true", base=asked["base"])
     if not parts.bodies:
         raise ModelError(
             parts.name, ["nothing in the file moves: give it a joint, or base=floating"]
         )
-    followers = {p.first for p in parts.joints if isinstance(p, Gear)}
-    start = {**parts.start, **start}
-    motors = []
-    for joint in parts.joints if chosen["motors"] != "none" else ():
-        if isinstance(joint, Joint) and len(joint.measures) == 1 and joint.name not in followers:
-            begin = start.get(joint.measures[0], 0.0) if chosen["motors"] == "motion" else 0.0
-            of = MOTORS[chosen["motors"]]
-            motors.append(Motor(f"{joint.name}_motor", joint, start=begin, **of))
+    start = {**parts.start, **given}
     return mechanism(
         parts.name,
         bodies=parts.bodies,
         joints=parts.joints,
-        loads=[Gravity(GRAVITY), *parts.loads, *motors],
+        loads=[Gravity(GRAVITY), *parts.loads, *motors(parts.joints, asked["motors"], start)],
         start=start,
         description=f"{path.name}{f': {parts.description}' if parts.description else ''}",
     )
-
-
-def _chosen(path: Path, arguments: Sequence[str]) -> tuple[dict[str, str], dict[str, float]]:
-    chosen, start, problems = {"base": "fixed", "motors": "none", "limits": "true"}, {}, []
-    for text in arguments:
-        name, sign, value = (part.strip() for part in text.partition("="))
-        if name in CHOICES and value in CHOICES[name]:
-            chosen[name] = value
-        elif name in CHOICES:
-            problems.append(f"{text!r}: expected {name}={' or '.join(CHOICES[name])}")
-        elif sign and "." in name:
-            try:
-                start[name] = float(value)
-            except ValueError:
-                problems.append(f"{text!r}: {value!r} is no number, expected one in SI")
-        else:
-            problems.append(
-                f"{text!r}: expected {', '.join(f'{n}=...' for n in CHOICES)}, or a start by the name of the "
-                "FMU, e.g. angle.j2=0.5"
-            )
-    if problems:
-        raise RequestError(str(path), problems)
-    return chosen, start

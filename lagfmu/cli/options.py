@@ -32,8 +32,8 @@ Arguments = Annotated[
     typer.Option(
         "-p",
         metavar="NAME=VALUE",
-        help="An argument of the file's function 'family', e.g. -p n=8; of a URDF file -p base=floating, "
-        "-p motors=torque, -p angle.j2=0.5; repeatable.",
+        help="An argument of the file's function 'family', e.g. -p n=8; of a URDF or MJCF file "
+        "-p base=floating, -p key=home, -p motors=torque, -p angle.j2=0.5; repeatable.",
     ),
 ]
 AddOutput = Annotated[
@@ -60,7 +60,7 @@ Target = Annotated[
     ),
 ]
 ModelPath = Annotated[
-    Path, typer.Argument(help="A Python file that defines a Model, or a URDF file.")
+    Path, typer.Argument(help="A Python file that defines a Model, or a URDF or MJCF file.")
 ]
 FmuPath = Annotated[Path, typer.Argument(help="An FMU built by lagfmu.")]
 Settings = Annotated[

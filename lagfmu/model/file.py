@@ -19,8 +19,9 @@ from .model import Model
 from .scene import Scene
 from .times import foreign_times
 
-# Files that are a model by themselves, by their ending: the module whose read(path, arguments) makes a Model.
-READERS = {".urdf": "lagfmu.bodies.urdf_model"}
+# Files that are a model by themselves, by their ending: the module whose read(path, arguments) makes a Model,
+# and whose PYTHON is the file that `new` writes of it.
+READERS = {".urdf": "lagfmu.bodies.urdf_model", ".xml": "lagfmu.bodies.mjcf_model"}
 
 
 def is_model(path: str | os.PathLike[str]) -> bool:

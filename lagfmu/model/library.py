@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 from importlib.resources import files
 from pathlib import Path
 
 from ..errors import LagfmuError, UsageError
+from .file import READERS
 
 TEMPLATE = '''"""A bead on a parabola z = k x^2.  Change it into your own system, then:
 
@@ -57,29 +59,6 @@ closed_forms = [Conserved("energy", output("energy.total"))]
 '''
 
 
-READ = '''"""The robot of {file}.  Add motors, contacts and closed loops of your own, then:
-
-    lagfmu simulate {own} --plot out.svg
-"""
-
-from pathlib import Path
-
-from lagfmu import Scene
-from lagfmu.bodies import Gravity, from_urdf, mechanism
-
-robot = from_urdf(Path(__file__).parent / {path!r})
-model = mechanism(
-    robot.name,
-    bodies=robot.bodies,
-    joints=[*robot.joints],
-    loads=[Gravity((0, 0, -9.81)), *robot.loads],
-    start={{**robot.start}},  # e.g. "angle.j2": 0.5
-    description=robot.description,
-)
-scenes = [Scene(model.name, stop_time=1.0, step_size=0.01)]
-'''
-
-
 def folder() -> Path:
     """Where the models that come with lagfmu lie: in the installed package, or beside it in a checkout."""
     package = Path(str(files("lagfmu")))
@@ -99,18 +78,21 @@ def new(path: Path, source: str | None = None) -> Path:
     """
     if path.suffix != ".py":
         path = path.with_name(f"{path.name}.py")
-    read = Path(source) if source is not None and Path(source).suffix.lower() == ".urdf" else None
+    reader = None if source is None else READERS.get(Path(source).suffix.lower())
+    read = Path(str(source)) if reader is not None else None
     if read is not None and not read.is_file():
         raise UsageError(f"there is no file {source!r}: correct the path")
     if source is not None and read is None and source not in known():
         raise UsageError(
-            f"there is no model {source!r}, expected a URDF file, or one of {', '.join(known())}"
+            f"there is no model {source!r}, expected a URDF or MJCF file, or one of {', '.join(known())}"
         )
     if path.exists():
         raise UsageError(f"{str(path)!r} is there already: choose another name")
-    if read is not None:
+    if read is not None and reader is not None:
         there = Path(os.path.relpath(read, path.parent)).as_posix()
-        text = READ.format(file=read.name, own=path.name, path=there)
+        text = importlib.import_module(reader).PYTHON.format(
+            file=read.name, own=path.name, path=there
+        )
     elif source is not None:
         text = (folder() / f"{source}.py").read_text(encoding="utf-8")
     else:

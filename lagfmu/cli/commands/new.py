@@ -16,7 +16,9 @@ def new(
     file: Annotated[Path, typer.Argument(help="The Python file to write.")],
     source: Annotated[
         str | None,
-        typer.Option("--from", help=f"A URDF file, or a model to copy: {', '.join(known())}."),
+        typer.Option(
+            "--from", help=f"A URDF or MJCF file, or a model to copy: {', '.join(known())}."
+        ),
     ] = None,
 ) -> None:
     """Write a commented model to start from."""
