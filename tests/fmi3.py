@@ -154,11 +154,12 @@ class Single(Caller):
         return Step(found, *(f.value for f in flags), time.value)
 
     def updates(self) -> tuple[bool, bool]:
-        """fmi3UpdateDiscreteStates: whether another instant is to follow, and states have changed."""
+        """fmi3UpdateDiscreteStates: whether another instant is to follow, and states have changed; `nominals`
+        whether these have."""
         flags, time = [c_bool(True) for _ in range(5)], c_double()
         self.does("UpdateDiscreteStates", *(byref(f) for f in flags), byref(time))
-        again, terminate, nominals, values, defined = (f.value for f in flags)
-        assert (terminate, nominals, defined) == (False, False, False)
+        again, terminate, self.nominals, values, defined = (f.value for f in flags)
+        assert (terminate, defined) == (False, False)
         return again, values
 
     def meets_event(self) -> None:

@@ -539,6 +539,8 @@ def test_model_exchange_life_cycle(pendulum):
     assert "'event mode'" in one.refuses("SetContinuousStates", x, c_size_t(4))
     info = one.goes_on()
     assert (info.needed, info.terminate, info.values, info.defined) == (0, 0, 0, 0)
+    assert info.nominals  # those of this start: the description has sizes of its own
+    assert not one.meets_event().nominals
     assert "3 values" in one.refuses("GetDerivatives", x, c_size_t(3))
     assert "'continuous-time mode'" in one.refuses("NewDiscreteStates", byref(info))
     (c_double * 4).from_buffer(x)[0] = math.nan

@@ -213,6 +213,7 @@ def test_model_exchange_opens_the_contact(library3):
     """Past cos(theta) = 2/3 the indicator is negative, and the event opens the contact, as in FMI 2.0."""
     one = library3("Hemisphere")(exchange=True).start()
     assert not one.updates()[0]
+    assert one.nominals  # those of this start
     one.does("EnterContinuousTimeMode")
     theta = 0.85
     rate = math.sqrt(2 * 9.81 * (1 - math.cos(theta)))

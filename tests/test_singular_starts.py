@@ -184,3 +184,25 @@ def test_a_puck_in_the_hole_has_no_inertia_about_it(target: str) -> None:
     with pytest.raises(SimulationError, match=r"singular on the constraint surface.*phi"):
         simulate(model, stop_time=0.1, start_values={"r": 0.0}, target=target)
     assert simulate(model, stop_time=0.01, target=target)["phi"][0] == 0
+
+
+def test_what_is_unique_changes_in_model_exchange_at_events_alone(tmp_path: Path) -> None:
+    """In line the rows depend on each other, and forces along it are shared somehow; discrete values stay as
+    they are until the next event, and are then those of the state."""
+    rates = {f"der(angle.{k})": w for k, w in zip("ABCD", (5.0, -5.0, 5.0, -5.0), strict=True)}
+    here, there = (
+        fmi2.Library(build_fmu(parallelogram(angle, **rates), folder, target="native"), folder)
+        for angle, folder in ((0.3, tmp_path), (0.0, tmp_path / "line"))
+    )
+    names = [n for n in here.variables if n.startswith("unique.")]
+    moving, line = (lib(kind=fmi2.EXCHANGE).start() for lib in (here, there))
+    for one in (moving, line):
+        one.goes_on()
+    assert not all(line.integer(n) for n in names)
+    moving.states(line.array("GetContinuousStates", here.description.numberOfContinuousStates))
+    assert all(moving.integer(n) for n in names)
+    saved = moving.saved()
+    moving.meets_event()
+    assert [moving.integer(n) for n in names] == [line.integer(n) for n in names]
+    moving.does("SetFMUstate", saved)
+    assert all(moving.integer(n) for n in names)

@@ -3,6 +3,8 @@
 
 #include <string.h>
 
+#include "exchange.h"
+
 SHARED_VALUE const char *const CATEGORIES[LOG_CATEGORIES] = {
     "logStatusWarning", "logStatusDiscard", "logStatusError",
     "logStatusFatal",   "logEvents",        "logAll"};
@@ -89,6 +91,7 @@ void component_reset(Component *c) {
 
 int component_turn(Component *c, const Call *call, int phase) {
     if (component_forbids(c, call)) return CALL_ERROR;
+    if (phase == CONTINUOUS) exchange_hold(&c->instance);
     c->instance.phase = phase;
     return CALL_OK;
 }

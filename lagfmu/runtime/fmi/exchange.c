@@ -93,6 +93,34 @@ Status exchange_nominals(Instance *x, double *nominals) {
     return OK;
 }
 
+int exchange_flag_count(const Instance *x) {
+    const System *s = x->solver.system, *full = s->embed != NULL ? s->full : s;
+    return full->m + full->unique_count + s->frictions;
+}
+
+/* The place of a discrete value that is evaluated at the state; NULL: it is none. */
+static int *flag_of(const Instance *x, const Variable *v) {
+    const System *s = x->solver.system, *full = s->embed != NULL ? s->full : s;
+    switch (v->place) {
+        case AT_UNIQUE: return x->flag + v->index;
+        case AT_OUTPUT_UNIQUE: return x->flag + full->m + v->index;
+        case AT_STICKS: return x->flag + full->m + full->unique_count + v->index;
+        default: return NULL;
+    }
+}
+
+int exchange_held(const Instance *x, const Variable *v, double *value) {
+    const int *flag = x->held ? flag_of(x, v) : NULL;
+    if (flag != NULL) *value = *flag;
+    return flag != NULL;
+}
+
+int exchange_nominals_news(Instance *x) {
+    const int news = x->exchange && !x->weighed;
+    x->weighed |= news;
+    return news;
+}
+
 /* Accelerations and multipliers at the state. */
 Status exchange_evaluate(Instance *x) {
     Solver *s = &x->solver;

@@ -26,6 +26,7 @@ SHARED Status exchange_differentiate(Instance *x, Direction d);
 static inline double exchange_change_of_vdot(const Instance *x, int i) { return x->back[i]; }
 SHARED Status exchange_indicators(Instance *x, double *indicators);
 SHARED Status exchange_nominals(Instance *x, double *nominals);
+SHARED int exchange_nominals_news(Instance *x); /* 1, once: they are those of this start, not of the description */
 
 /* After a step of the importer's integrator; `event`: 1 if the state should be projected. */
 SHARED Status exchange_step_done(Instance *x, int *event);
@@ -35,6 +36,12 @@ SHARED Status exchange_step_done(Instance *x, int *event);
  * continuous states changed in either. */
 SHARED Status exchange_enter_event(Instance *x);
 SHARED Status exchange_event(Instance *x, int *moved);
+
+/* Discrete values that are evaluated at the state (unique.*, sticks.*) are those of now until the next event; 1: v is one,
+ * and has that value.  Nothing is held where they cannot be evaluated. */
+SHARED int exchange_flag_count(const Instance *x);
+SHARED void exchange_hold(Instance *x);
+SHARED int exchange_held(const Instance *x, const Variable *v, double *value);
 
 /* How quickly drift dies, x->gain [1/s], for the motion from this state on. */
 SHARED Status exchange_find_gain(Instance *x);

@@ -214,7 +214,18 @@ static Status tell_features(Instance *x) {
     return OK;
 }
 
+void exchange_hold(Instance *x) {
+    const System *s = x->solver.system, *full = s->embed != NULL ? s->full : s;
+    const Observed *o = &x->seen;
+    x->held = x->exchange && (full->unique_count > 0 ? instance_observe_unique(x) : instance_observe(x)) == OK;
+    if (!x->held) return;
+    memcpy(x->flag, o->unique, (size_t)full->m * sizeof *x->flag);
+    memcpy(x->flag + full->m, o->own_unique, (size_t)full->unique_count * sizeof *x->flag);
+    memcpy(x->flag + full->m + full->unique_count, o->sticks, (size_t)s->frictions * sizeof *x->flag);
+}
+
 Status exchange_enter_event(Instance *x) {
+    x->held = 0;
     return moving(x, come_back) == OK ? tell_features(x) : FAILED;
 }
 

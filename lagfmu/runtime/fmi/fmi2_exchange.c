@@ -20,6 +20,7 @@ fmi2Status fmi2NewDiscreteStates(fmi2Component component, fmi2EventInfo *eventIn
     if (eventInfo == NULL) return component_missing(c, call);
     if (exchange_event(&c->instance, &moved) != OK) return component_failed(c, fmi2Error);
     eventInfo->valuesOfContinuousStatesChanged = moved ? fmi2True : fmi2False;
+    eventInfo->nominalsOfContinuousStatesChanged = exchange_nominals_news(&c->instance) ? fmi2True : fmi2False;
     return fmi2OK;
 }
 

@@ -29,7 +29,8 @@ FMI3(fmi3Status, fmi3UpdateDiscreteStates)(fmi3Instance instance, fmi3Boolean *d
         return component_missing(c, call);
     if (component_update(c, &moved, &again) != CALL_OK) return fmi3Error;
     *discreteStatesNeedUpdate = again;
-    *terminateSimulation = *nominalsOfContinuousStatesChanged = *nextEventTimeDefined = fmi3False;
+    *terminateSimulation = *nextEventTimeDefined = fmi3False;
+    *nominalsOfContinuousStatesChanged = exchange_nominals_news(&c->instance);
     *valuesOfContinuousStatesChanged = moved;
     *nextEventTime = 0;
     return fmi3OK;

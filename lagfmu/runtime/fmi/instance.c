@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "algebraic.h"
+#include "exchange.h"
 #include "feature.h"
 #include "indicators.h"
 
@@ -27,6 +28,7 @@ void instance_layout(Instance *x, Arena *arena) {
         x->joint0 = arena_doubles(&saved, 2 * system->joint_count);
         x->expected = arena_doubles(&saved, system->inputs);
         x->set = arena_ints(&saved, system->inputs);
+        x->flag = arena_ints(&saved, exchange_flag_count(x));
         x->multiplier = arena_doubles(&saved, ALGEBRAIC != NULL ? system->m : 0);
         x->past = arena_take(&saved, (size_t)system->estimated_count, sizeof *x->past);
         x->priority = arena_take(&scratch, (size_t)system_starts(system), sizeof *x->priority);
@@ -73,7 +75,7 @@ void instance_reset(Instance *x) {
     x->tolerance = 0;
     x->given.method = (MethodName)DEFAULT_METHOD;
     x->solver.on_demand = 1;
-    x->started = x->running = x->warned = x->moved = x->ticking = 0;
+    x->started = x->running = x->warned = x->held = x->weighed = x->moved = x->ticking = 0;
     x->version += 1;
     x->imposed = x->unsettled = 0;
     instance_settled(x);

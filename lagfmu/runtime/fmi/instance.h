@@ -38,6 +38,8 @@ typedef struct {
     N(int, running, FLAG, "mode")                             /* 1: the start is over, only inputs can be set */      \
     N(int, warned, OTHER, "mode")                             /* 1: a jump of a prescribed motion has been told; 2 << i:
                                                                * lookup i outside */                                  \
+    N(int, held, FLAG, "discrete values")                     /* 1: those of the latest event are in `flag` (exchange.h) */ \
+    N(int, weighed, FLAG, "nominals")                         /* 1: that they are not the description's has been told */ \
     N(int, moved, FLAG, "whether an event has moved the states")   /* in model exchange, since this was told */       \
     N(int, ticking, FLAG, "whether clocks tick")              /* 1: an event of this instant has been met, and not yet
                                                                * what follows from it */                              \
@@ -73,6 +75,7 @@ typedef struct Instance {
     Priority *priority;     /* (system_starts()) who said them; found anew at each start */
     double *begin;          /* (system_starts()) the start values then, with those that follow from parameters */
     double *formula;        /* (started_count of the system) these */
+    int *flag;              /* (exchange_flag_count()) */
     double *expected;       /* (inputs) values at the end of the latest step */
     int *set;               /* (inputs) 1: set since the latest step */
     Count *before[EVENT_KINDS]; /* (contacts, or frictions) how many events there were before a step */

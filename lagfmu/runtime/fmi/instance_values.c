@@ -115,6 +115,7 @@ static Status indicator(Instance *x, int i, double *value) {
 
 Status instance_get(Instance *x, const Variable *v, double *value) {
     if (v->place == AT_SENSITIVITY || v->place == AT_SENSITIVITY_VALID) return DERIVATIVES->get(x, v, value);
+    if (exchange_held(x, v, value)) return OK;
     const int estimated = v->place == AT_INPUT && x->solver.system->estimated_count > 0;
     if (v->place == AT_INPUT && x->between.paused && x->between.supplied[v->index]) {
         *value = x->between.value[v->index];

@@ -12,6 +12,7 @@
 
 #include "algebraic.h"
 #include "digits.h"
+#include "exchange.h"
 #include "feature.h"
 #include "indicators.h"
 #include "optional.h"
@@ -107,6 +108,7 @@ static Status each_of_instance(Instance *x) {
     SOUND(x->q0, s->nq, FINITE, "start values")
     SOUND(x->v0, s->nv, FINITE, "start values")
     SOUND(x->joint0, 2 * s->joint_count, FINITE, "start values")
+    SOUND(x->flag, exchange_flag_count(x), FLAG, "discrete values")
     SOUND(x->multiplier, ALGEBRAIC != NULL ? s->m : 0, FINITE, "multipliers")
     return OK;
 }
@@ -115,6 +117,7 @@ static Status each_of_instance(Instance *x) {
 static Status together(Instance *x) {
     const Solver *s = &x->solver;
     if (x->running && !x->started) return restored_none(x, "mode", x->running);
+    if (x->held && !(x->exchange && x->running)) return restored_none(x, "discrete values", 1);
     if (x->imposed && !(ALGEBRAIC != NULL && x->exchange && x->running)) return restored_none(x, "multipliers", 1);
     if (x->warned < 0) return restored_none(x, "mode", x->warned); /* bits of what has been told */
     if (!offered(x->given.method)) return restored_none(x, "given method", (double)x->given.method);
