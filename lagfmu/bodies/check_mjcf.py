@@ -6,12 +6,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from lxml import etree
+from . import markup
 
-LARGEST = 20_000_000  # bytes of the file and of each that it includes
-DEEPEST = 200  # elements within each other
-MOST = 200_000  # elements of all files
-TEXT = "text of the file itself"
+READ = ("include", "model")  # elements that name a file with elements of its own
 
 
 def problems_of_files(path: Path) -> list[str]:
@@ -21,40 +18,17 @@ def problems_of_files(path: Path) -> list[str]:
 
 def _of_file(path: Path, folder: Path, within: tuple[Path, ...], seen: set[Path]) -> Iterator[str]:
     name = path.name
-    try:
-        if not path.is_file():
-            raise OSError(None, "no such file")
-        if path.stat().st_size > LARGEST:
-            yield (
-                f"{name!r} has {path.stat().st_size} bytes, expected at most {LARGEST}: leave out what is no "
-                "mechanism"
-            )
-            return
-        content = path.read_bytes()
-    except OSError as error:
-        yield f"{str(path)!r} cannot be read ({error.strerror or error}): correct the path"
-        return
-    if b"<!DOCTYPE" in content or b"<!ENTITY" in content:
-        yield f"{name!r} has a DOCTYPE, whose entities are not expanded: write the {TEXT} in their place"
-        return
-    parser = etree.XMLParser(resolve_entities=False, no_network=True, huge_tree=False)
-    try:
-        root = etree.fromstring(content, parser)
-    except (etree.XMLSyntaxError, ValueError) as error:
-        yield f"{name!r} is no XML: {error}"
+    root, problem = markup.read(path)
+    if root is None:
+        yield problem
         return
     if not within and root.tag != "mujoco":
-        yield f"the root of {name!r} is <{root.tag}>, expected <mujoco>"
+        yield f"the root of {name!r} is <{root.tag}>, expected <mujoco>: name an MJCF file"
         return
-    elements = [e for e in root.iter() if isinstance(e.tag, str)]
-    if len(elements) > MOST:
-        count = len(elements)
-        yield f"{name!r} has {count} elements, expected at most {MOST}: leave out what is no mechanism"
+    if len(within) > markup.DEEPEST:
+        yield f"{name!r} is included by {len(within)} files in turn: write them into one"
         return
-    if _depth(root) > DEEPEST:
-        yield f"{name!r} has elements deeper than {DEEPEST}: hang bodies on fewer others"
-        return
-    for element in elements:
+    for element in (e for e in root.iter() if isinstance(e.tag, str)):
         yield from _of_element(element, name, folder, (*within, path.resolve()), seen)
 
 
@@ -64,6 +38,9 @@ def _of_element(
     where = f"{name!r}: <{e.tag}> in line {e.sourceline}"
     if e.tag in ("plugin", "instance"):
         yield f"{where} runs code of a plugin, which nothing here does: leave it out"
+    for key, value in e.attrib.items():
+        if "nan" in value.lower().split():
+            yield f"{where} has {key}={value!r}, expected finite numbers: correct it"
     named = [(k, v) for k, v in e.attrib.items() if k.startswith("file") or k.endswith("dir")]
     for key, value in named:
         target = (folder / value).resolve()
@@ -72,17 +49,8 @@ def _of_element(
                 f"{where} names {value!r}, which is not in the folder of the file: copy it there, and "
                 f"name it by a relative path in {key}="
             )
-        elif e.tag == "include" and target in within:
+        elif e.tag in READ and target in within:
             yield f"{where} includes {value!r}, which includes it: leave out one of the two"
-        elif e.tag == "include" and target not in seen:
+        elif e.tag in READ and target not in seen:
             seen.add(target)
             yield from _of_file(target, folder, within, seen)
-
-
-def _depth(root: Any) -> int:
-    deepest, waiting = 0, [(root, 1)]
-    while waiting:
-        element, depth = waiting.pop()
-        deepest = max(deepest, depth)
-        waiting += [(child, depth + 1) for child in element]
-    return deepest

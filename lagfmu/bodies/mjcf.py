@@ -90,7 +90,7 @@ def from_mjcf(
         m = mujoco.MjModel.from_xml_path(str(path))
     except ValueError as error:
         text = " ".join(str(error).split())
-        raise ModelError(path.name, [f"MuJoCo does not take it: {text}"]) from None
+        raise ModelError(path.name, [f"MuJoCo does not take it: {text}: correct that"]) from None
     return _Reader(mujoco, m, path.stem, limits, key, actuators).parts()
 
 

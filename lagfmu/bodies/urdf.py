@@ -10,8 +10,10 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Iterator, Mapping
+from collections import defaultdict
+from collections.abc import Iterator
 from dataclasses import dataclass
+from heapq import heappop, heappush
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -21,12 +23,14 @@ from numpy.typing import NDArray
 
 from ..errors import LagfmuWarning, ModelError
 from ..model.picture import Box, Rod, Shape, Sphere
+from . import markup
 from .body import Body, Ground, Marker
 from .check_urdf import number_of_dynamics, problems_of_parts, problems_of_text, problems_of_tree
 from .inertia import components, together
-from .joints import Fixed, Gear, Joint, Planar, Prismatic, Revolute
+from .joints import Fixed, Gear, Joint, Planar, Prismatic, Revolute, Spherical
 from .loads import Torsion
 from .rotation import onto, quaternion
+from .urdf_text import left_out, needed
 from .words import words_of
 
 KINDS: dict[str, Any] = {
@@ -36,7 +40,9 @@ KINDS: dict[str, Any] = {
     "fixed": Fixed,
     "planar": Planar,
     "floating": None,  # leaves its child free
+    "spherical": Spherical,  # of Bullet
 }
+WITHOUT_AXIS = ("fixed", "spherical")
 BASES = ("fixed", "floating")
 UP = np.array([0.0, 0.0, 1.0])
 Pose = NDArray[np.float64]  # (4, 4) homogeneous
@@ -77,35 +83,37 @@ def from_urdf(
     """
     if base not in BASES:
         raise ModelError(Path(file).name, [f"base is {base!r}, expected 'fixed' or 'floating'"])
-    robot = _read(Path(file))
+    robot, left = _read(Path(file))
     problems = [*problems_of_tree(robot), *problems_of_parts(robot, KINDS, limits)]
     if problems:
         raise ModelError(str(robot.name), problems)
     builder = _Builder(robot, limits, base == "floating", fold_fixed)
     if builder.problems:
         raise ModelError(str(robot.name), builder.problems)
-    left = _left_out(robot)
     if left:
         warnings.warn(f"{robot.name!r}: {left}", LagfmuWarning, stacklevel=2)
     return builder.parts(left)
 
 
-def _read(path: Path) -> Any:
+def _read(path: Path) -> tuple[Any, str]:
+    """What yourdfpy makes of it, and in words what it has and a mechanism has not."""
     try:
         from yourdfpy import URDF
     except ImportError:
         raise ModelError(path.name, ["reading URDF needs yourdfpy: pip install yourdfpy"]) from None
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        problem = f"{str(path)!r} cannot be read ({error.strerror or error}): correct the path"
-        raise ModelError(path.name, [problem]) from None
-    if problems := problems_of_text(content):
+    root, problem = markup.read(path)
+    if root is None:
+        raise ModelError(path.name, [problem])
+    if problems := problems_of_text(path.name, root):
         raise ModelError(path.name, problems)
+    left = left_out(root)
     try:
-        return URDF.load(BytesIO(content), build_scene_graph=False, load_meshes=False).robot
-    except Exception as error:  # of what lagfmu does not need: a colour, a calibration
-        problem = f"{str(path)!r} is no URDF file that can be read: {str(error).splitlines()[0]}"
+        file = BytesIO(needed(root))
+        return URDF.load(file, build_scene_graph=False, load_meshes=False).robot, left
+    except Exception as error:
+        problem = (
+            f"{str(path)!r} is no URDF file that yourdfpy reads: {' '.join(str(error).split())}"
+        )
         raise ModelError(path.name, [problem]) from None
 
 
@@ -196,7 +204,7 @@ class _Builder:
             if (damping := number_of_dynamics(j, "damping")) and self._rubs(j):
                 name = self.words.joints[j.name]
                 loads.append(Torsion(f"{name}_damper", name, damping=damping))
-        moving = [j for j in self.joints if self._moves(j) and j.type != "fixed"]
+        moving = [j for j in self.joints if self._moves(j) and j.type not in WITHOUT_AXIS]
         for j in moving:
             start[self._measure(j)] = self._start(j)
         gears = [j for j in moving if j.mimic is not None]
@@ -257,7 +265,7 @@ class _Builder:
         on, pose = self.carrier[joint.parent]
         pose = pose @ _pose(joint.origin)
         turned = np.eye(4)
-        if joint.type != "fixed":
+        if joint.type not in WITHOUT_AXIS:
             axis = (1.0, 0.0, 0.0) if joint.axis is None else joint.axis
             turned[:3, :3] = onto(UP, np.array(axis, dtype=float) / np.linalg.norm(axis))
         first = _marker(self.bodies[on], pose @ turned)
@@ -265,7 +273,7 @@ class _Builder:
         friction = number_of_dynamics(joint, "friction") if self._rubs(joint) else 0.0
         kind, word = KINDS[joint.type], "force" if joint.type == "prismatic" else "torque"
         rubs = {f"friction_{word}": friction} if friction else {}
-        axis_of_marker = "" if joint.type == "fixed" else "z"
+        axis_of_marker = "" if joint.type in WITHOUT_AXIS else "z"
         name = self.words.joints[joint.name]
         made: Joint = kind(name, first, second, axis_of_marker, self._stops(joint), **rubs)
         return made
@@ -287,13 +295,16 @@ class _Builder:
 
 
 def _along_tree(robot: Any, root: str) -> Iterator[Any]:
-    """The joints, each behind that of its parent."""
-    reached, waiting = {root}, list(robot.joints)
+    """The joints in the order of the file, but each behind that of its parent."""
+    of: dict[str, list[int]] = defaultdict(list)
+    for k, joint in enumerate(robot.joints):
+        of[joint.parent].append(k)
+    waiting = of[root]
     while waiting:
-        joint = next(j for j in waiting if j.parent in reached)
-        waiting.remove(joint)
-        reached.add(joint.child)
+        joint = robot.joints[heappop(waiting)]
         yield joint
+        for k in of[joint.child]:
+            heappush(waiting, k)
 
 
 def _inertias(parts: list[tuple[Any, Pose]]) -> Iterator[tuple[float, Pose, Pose]]:
@@ -327,18 +338,6 @@ def _shapes(link: Any, pose: Pose) -> Iterator[Shape]:
             yield Rod(low, high, float(geometry.cylinder.radius))
         elif geometry.sphere is not None:
             yield Sphere(tuple(center.tolist()), float(geometry.sphere.radius))
-
-
-def _left_out(robot: Any) -> str:
-    """What the file has and a mechanism has not, with counts."""
-    drawn = [e for link in robot.links for e in link.visuals]
-    counts: Mapping[str, int] = {
-        "meshes": sum(e.geometry.mesh is not None for e in drawn),
-        "transmissions": len(robot.transmission or ()),
-        "extensions of Gazebo": len(robot.gazebo or ()),
-    }
-    found = [f"{what} ({count})" for what, count in counts.items() if count]
-    return f"{', '.join(found)} are left out" if found else ""
 
 
 def _marker(carrier: Body | Ground, pose: Pose) -> Marker:
