@@ -6,7 +6,6 @@
 #include "losses.h"
 #include "nominals.h"
 #include "optional.h"
-#include "outputs.h"
 #include "column.h"
 
 #define TAKE(type, member, many, sort, name) x->member = arena_take(saved, (size_t)(many), sizeof *x->member);
@@ -77,34 +76,4 @@ void solver_layout(Solver *s, Arena *saved, Arena *scratch, const System *system
     lay_out_parts(s, scratch);
     for (int k = 0; s->features != NULL && s->features[k] != NULL; k++)
         s->own[k] = s->features[k]->layout != NULL ? s->features[k]->layout(s, saved, scratch) : NULL;
-}
-
-void observed_layout(Observed *o, Arena *arena, const System *system) {
-    const System *full = system->embed != NULL ? system->full : system;
-    const int nq = full->nq, nv = full->nv, m = full->m, stepped = system->embed != NULL ? system->nq : 0;
-    o->q = arena_doubles(arena, nq);
-    o->v = arena_doubles(arena, nv);
-    o->rate = arena_doubles(arena, full->kinematics != NULL ? nq : 0);
-    o->vdot = arena_doubles(arena, nv);
-    o->lambda = arena_doubles(arena, m);
-    o->residual = arena_doubles(arena, m);
-    o->unique = arena_ints(arena, m);
-    o->force = arena_doubles(arena, nv);
-    o->share = arena_doubles(arena, full->entries);
-    o->applied = arena_doubles(arena, nv);
-    o->own = arena_doubles(arena, full->output_count);
-    o->other = arena_doubles(arena, full->output_count);
-    o->own_unique = arena_ints(arena, full->unique_count);
-    o->work_unique = arena_doubles(arena, outputs_unique_doubles(full));
-    o->s = arena_doubles(arena, stepped);
-    o->sdot = arena_doubles(arena, stepped);
-    o->sddot = arena_doubles(arena, stepped);
-    for (int k = 0; k < EVENT_KINDS && stepped > 0; k++) {
-        o->latest_q[k] = arena_doubles(arena, event_count_of(system, (EventKind)k) * nq);
-        o->latest_v[k] = arena_doubles(arena, event_count_of(system, (EventKind)k) * nv);
-    }
-    o->slip = arena_doubles(arena, 2 * system->frictions);
-    o->margin = arena_doubles(arena, system->frictions);
-    o->power = arena_doubles(arena, system->frictions);
-    o->sticks = arena_ints(arena, system->frictions);
 }

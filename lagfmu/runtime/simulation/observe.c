@@ -12,6 +12,20 @@
 #include "outputs.h"
 #include "segment.h"
 
+#define TAKE_NUMBERS(member, many, of, name) o->member = arena_doubles(arena, many);
+#define TAKE_FLAGS(member, many, of, name) o->member = arena_ints(arena, many);
+
+void observed_layout(Observed *o, Arena *arena, const System *own) {
+    const System *full = own->embed != NULL ? own->full : own;
+    const int stepped = own->embed != NULL ? own->nq : 0;
+    OBSERVED_NUMBERS(TAKE_NUMBERS)
+    OBSERVED_FLAGS(TAKE_FLAGS)
+    for (int k = 0; k < EVENT_KINDS && stepped > 0; k++) {
+        o->latest_q[k] = arena_doubles(arena, event_count_of(own, (EventKind)k) * full->nq);
+        o->latest_v[k] = arena_doubles(arena, event_count_of(own, (EventKind)k) * full->nv);
+    }
+}
+
 static int same_row(const System *a, int i, const System *b, int k) {
     return strcmp(a->rows[i].name, b->rows[k].name) == 0;
 }
@@ -120,12 +134,6 @@ static void observe_events(const Solver *s, EventKind kind, Observed *o) {
     }
 }
 
-/* What some values belong to. */
-typedef enum {
-    OF_NONE, OF_COORDINATE, OF_SPEED, OF_ACCELERATION, OF_FORCE, OF_STEPPED, OF_ROW, OF_ENTRY, OF_CONTACT, OF_SLIP,
-    OF_FRICTION
-} Owner;
-
 /* Its names, "" where there are fewer than three. */
 static StateName names(const Solver *s, const System *full, Owner of, int i) {
     const System *own = s->system;
@@ -146,11 +154,13 @@ static StateName names(const Solver *s, const System *full, Owner of, int i) {
     return (StateName){"", "", ""};
 }
 
+#define LOOK_AT(member, many, of, format) {o->member, of == OF_NONE ? 0 : (many), of, format},
+
 /* FAILED if a value is not finite; the cause names them as the FMU's variables are named. */
 static Status check_observed_finite(Solver *s, const System *full, const Observed *o) {
     const System *own = s->system;
-    const int n = full->nq, nv = full->nv, plain = full->kinematics == NULL, stepped = own->embed != NULL ? own->nq : 0;
-    const int kept = stepped > 0 ? own->contacts * n : 0; /* with an embedding there are no frictions */
+    const int stepped = own->embed != NULL ? own->nq : 0;
+    const int kept = stepped > 0 ? own->contacts * full->nq : 0; /* with an embedding there are no frictions */
     const double total = o->energy[0] + o->energy[1];
     const struct {
         const double *values;
@@ -158,17 +168,7 @@ static Status check_observed_finite(Solver *s, const System *full, const Observe
         Owner of;
         const char *format;
     } list[] = {
-        {o->q, n, OF_COORDINATE, "%s"},
-        {o->v, nv, OF_SPEED, "%s%s%s"},
-        {o->rate, plain ? 0 : n, OF_COORDINATE, "der(%s)"},
-        {o->vdot, nv, OF_ACCELERATION, "%s%s%s"},
-        {o->force, nv, OF_FORCE, "Q.%s"},
-        {o->s, stepped, OF_STEPPED, "%s"},
-        {o->sdot, stepped, OF_STEPPED, "der(%s)"},
-        {o->sddot, stepped, OF_STEPPED, "der(%s,2)"},
-        {o->lambda, full->m, OF_ROW, "lambda.%s"},
-        {o->residual, full->m, OF_ROW, "residual.%s"},
-        {o->share, full->entries, OF_ENTRY, "Q.%s.%s"},
+        OBSERVED_NUMBERS(LOOK_AT)
         {&o->energy[0], 1, OF_NONE, "energy.kinetic"},
         {&o->energy[1], 1, OF_NONE, "energy.potential"},
         {&total, 1, OF_NONE, "energy.total"},
@@ -176,9 +176,6 @@ static Status check_observed_finite(Solver *s, const System *full, const Observe
         {o->latest_v[DEPARTURE], kept, OF_CONTACT, "departure.%s.velocity.%s"},
         {o->latest_q[CLOSING], kept, OF_CONTACT, "closing.%s.%s"},
         {o->latest_v[CLOSING], kept, OF_CONTACT, "closing.%s.velocity.%s"},
-        {o->slip, 2 * own->frictions, OF_SLIP, "slip.%s"},
-        {o->margin, own->frictions, OF_FRICTION, "margin.%s"},
-        {o->power, own->frictions, OF_FRICTION, "power.%s"},
         {&s->state.now.lost, 1, OF_NONE, "energy.dissipated"},
     };
     int bad = 0;

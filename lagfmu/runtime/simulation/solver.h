@@ -4,6 +4,7 @@
 
 #include "linkage.h"
 #include "mechanism.h"
+#include "observed.h"
 #include "start_priority.h"
 #include "sensitivity.h"
 #include "state.h"
@@ -11,25 +12,6 @@
 /* Where solver_advance() ends before its t_end: nowhere, but an event is passed within; after each event; before its
  * modes change, at each event or at one that lies at t_end. */
 typedef enum { HALT_NEVER, HALT_AFTER, HALT_BEFORE, HALT_BEFORE_LAST } Halt;
-
-/* What an importer can read at a state; arrays of the full system (nq, nv, m, entries). */
-typedef struct {
-    double *q, *v, *vdot;          /* (nq), (nv), (nv) of the full system */
-    double *rate;                  /* q' (nq) where it is not v */
-    double *lambda, *residual;     /* (m) */
-    int *unique;                   /* (m) */
-    double *force, *share;         /* Q (nv); one constraint's part of it (entries) */
-    double *applied;               /* F (nv), of the unconstrained motion */
-    double energy[2];              /* kinetic, potential */
-    double *own, *other;           /* (output_count) the model's own; where these are not finite */
-    int *own_unique;               /* (unique_count), with */
-    int asked;                     /* 1: own_unique is wanted, a solve for each */
-    double *work_unique;           /* (outputs_unique_doubles()) */
-    double *s, *sdot, *sddot;      /* (nq of the stepped system) of an embedding */
-    double *latest_q[EVENT_KINDS], *latest_v[EVENT_KINDS]; /* of an embedding: state.latest in full coordinates */
-    double *slip, *margin, *power; /* (2 frictions), (frictions), (frictions) */
-    int *sticks;                   /* (frictions) */
-} Observed;
 
 /* By what a column of a run's derivatives is taken: p[parameter], or the start value of `state`; the other is -1. */
 typedef struct {
@@ -149,8 +131,6 @@ SHARED Status solver_arrive(Solver *s);
 /* The same where the integrator has been beyond t_end already, and q and v there are found on demand: nothing
  * is left to do, and nothing can fail.  0: it has not been there, and nothing was done. */
 SHARED int solver_pass(Solver *s, double t_end);
-
-SHARED void observed_layout(Observed *o, Arena *arena, const System *system);
 
 /* observe.c -- evaluates all of them at the state and inputs of now.  FAILED: one is not finite. */
 SHARED Status solver_observe(Solver *s, Observed *o);
