@@ -56,18 +56,132 @@ FOLLOWS = "unless another start is set"  # ends the description of a start that 
 METHOD, TOLERANCE, STEP = "solver.method", "solver.tolerance", "solver.step"
 MAXIMUM_STEP, MAXIMUM_STEPS = "solver.maximum_step", "solver.maximum_steps"
 
-OF_ONE = (MULTIPLIER, UNIQUE, RESIDUAL, CONTACT, STICKS, MARGIN, POWER, SLIP)
 EVENTS = (DEPARTURE, CLOSING, SLIPPING, STICKING)
 PEAK = "peak"  # the extremes of another variable: peak.lambda.rod.max
 PEAKS = tuple(f"{PEAK}.{part}" for part in ("max", "min", "max_time", "min_time"))
 RATES = ("", "velocity", "acceleration")  # a structured name has der() around it or not at all
 REACTIONS = (MULTIPLIER, FORCE)
 MODES = (CONTACT, STICKS)
-OF_FRICTION = (STICKS, SLIP, MARGIN, POWER, SLIPPING, STICKING)
 OF_OTHERS = (ERROR, PEAK, SENSITIVITY)  # of another variable
 RESERVED = (  # what nothing of a model's can be called
     *("Q", "contact", "count", "departure", "der", "energy", "error", "lambda", "residual"),
     *("sensitivity", "solver", "t", "time", "unique", "velocity"),
+)
+
+
+# Of what there is one output each: the model, a constraint, the direction of a coordinate (or a share of the
+# force on it), a contact, a friction, a row of one.
+MODEL, CONSTRAINT, DIRECTION, SHARE = "model", "constraint", "direction", "share"
+OF_CONTACT, FRICTION, ROW = "of a contact", "friction", "row"
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of output: all that is to say of it but its formula.
+
+    `each`: of what there is one; `place`: where the native runtime has it (runtime/fmi/variables.h); `text`:
+    what it is, {what} being its owner's name; `unit`, `behind`: what interface/outputs.py knows its owner
+    by, or the parts of an energy that the equations have; `held`: it changes at events alone, so that a peak
+    does not sample it; `barred`: it has an error bar.
+    """
+
+    quantity: str
+    each: str
+    place: str
+    text: str
+    unit: str = ""
+    behind: str = ""
+    type: str = "Real"
+    held: bool = False
+    barred: bool = False
+
+
+OUTPUTS = (
+    Kind(
+        MULTIPLIER,
+        CONSTRAINT,
+        "LAMBDA",
+        "multiplier of {what}",
+        "multiplier",
+        "solved",
+        barred=True,
+    ),
+    Kind(RESIDUAL, CONSTRAINT, "RESIDUAL", "{missed} of {what}", "missed", "missed"),
+    Kind(
+        *(UNIQUE, CONSTRAINT, "UNIQUE", "true where {multiplier} is determined uniquely"),
+        behind="entries",
+        type="Boolean",
+    ),
+    Kind(
+        *(FORCE, DIRECTION, "FORCE", "generalized force of all constraints on {what}"),
+        *("force", "solved"),
+        barred=True,
+    ),
+    Kind(
+        *(FORCE, SHARE, "SHARE", "generalized force of constraint {constraint} on {what}"),
+        *("force", "solved"),
+        barred=True,
+    ),
+    Kind(KINETIC, MODEL, "KINETIC", "kinetic energy", "J", "kinetic"),
+    Kind(POTENTIAL, MODEL, "POTENTIAL", "potential energy", "J", "potential"),
+    Kind(TOTAL, MODEL, "TOTAL", "kinetic plus potential energy", "J", "kinetic potential"),
+    Kind(
+        *(CONTACT, OF_CONTACT, "CONTACT", "true while {what} is closed"),
+        behind="modes",
+        type="Boolean",
+    ),
+    Kind(
+        *(IMPULSE, OF_CONTACT, "IMPULSE"),
+        "impulse of {what} in its latest impact: the integral of its multiplier over time",
+        *("impulse", "nothing"),
+        held=True,
+    ),
+    Kind(
+        *(
+            STICKS,
+            FRICTION,
+            "STICKS",
+            "true while {what} sticks (and its normal contact is closed)",
+        ),
+        behind="modes",
+        type="Boolean",
+    ),
+    Kind(SLIP, ROW, "SLIP", "slip velocity G v - nu of {what}", "velocity", "rates"),
+    Kind(
+        *(MARGIN, FRICTION, "MARGIN"),
+        "static coefficient times normal force less |lambda| of {what}",
+        *("multiplier", "modes"),
+    ),
+    Kind(
+        *(POWER, FRICTION, "POWER"),
+        "power of {what}, lambda times slip velocity, never positive",
+        *("W", "modes"),
+    ),
+    Kind(DISSIPATED, MODEL, "LOST", "energy that {what} dissipated so far", "J", "nothing"),
+    Kind(DISSIPATION, MODEL, "LOST_RATE", "power that frictions dissipate", "W", "losses"),
+    Kind(STEPS, MODEL, "STEPS", "internal steps taken so far", behind="nothing", type="Integer"),
+)
+
+
+def kinds(*each: str) -> tuple[Kind, ...]:
+    """The kinds of output of which there is one for each of these, in the order of the table."""
+    return tuple(kind for kind in OUTPUTS if kind.each in each)
+
+
+OF_ONE = tuple(
+    kind.quantity
+    for kind in kinds(CONSTRAINT, OF_CONTACT, FRICTION, ROW)
+    if "." not in kind.quantity
+)
+OF_FRICTION = (*(kind.quantity for kind in kinds(FRICTION, ROW)), SLIPPING, STICKING)
+ENERGIES = {  # by what the equations have of them
+    kind.quantity: parts
+    for kind in kinds(MODEL)
+    if (parts := kind.behind.split()) and {*parts} <= {"kinetic", "potential"}
+}
+BARRED = (  # what has an error bar, besides coordinates and velocities
+    *dict.fromkeys(kind.quantity for kind in OUTPUTS if kind.barred),
+    *(OWN, *COUNT_OF),
 )
 
 

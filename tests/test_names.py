@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 from sympy import symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Contact, Holonomic, Model, Output, Parameter, Scene, multiplier, names, simulate
 from lagfmu.names import Subject
+
+DOCS = Path(__file__).parent.parent / "docs"
 
 
 @pytest.mark.parametrize(
@@ -114,3 +118,15 @@ def test_of_a_mechanism_the_joints_come_first():
         "angle.A",
     ]
     assert names.of_interest([*rows, *moving]) == [*rows, "rod.position.x", "angle.A"]
+
+
+@pytest.mark.parametrize("kind", names.OUTPUTS, ids=lambda kind: f"{kind.quantity} {kind.each}")
+def test_what_an_fmu_reports_stands_in_the_documentation(kind: names.Kind) -> None:
+    """Of each kind of output a page says what it is: lambda.surface, energy.total, closing.surface.impulse."""
+    pages = "".join(
+        (DOCS / name).read_text(encoding="utf-8") for name in ("variables.md", "friction.md")
+    )
+    one = "" if kind.each == names.MODEL else "*"
+    head, _, tail = names.name(kind.quantity, one).partition(".*")
+    assert f"`{head}" in pages
+    assert not tail or f"`{tail}`" in pages

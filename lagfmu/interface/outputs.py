@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections import defaultdict
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from functools import cached_property
 
 import sympy as sp
@@ -29,13 +29,11 @@ from ..model.units import (
     multiplier_unit,
     parse_unit,
 )
-from ..names import Subject
+from ..names import Kind, Subject
 from .dependencies import Dependencies, Names, one_of
 from .variables import Variable
 
-BARRED = (  # what has an error bar, besides coordinates, velocities and outputs of one word
-    *(names.MULTIPLIER, names.FORCE, names.OWN, *names.COUNT_OF),
-)
+UNITS = {"J": ENERGY, "W": POWER}
 
 
 class Outputs:
@@ -48,9 +46,6 @@ class Outputs:
 
     def all(self) -> list[Variable]:
         """In the order of the table."""
-        steps = self.output(
-            Subject(names.STEPS), "internal steps taken so far", None, (), "Integer"
-        )
         return [
             *self.motion(),
             *self.constraints(),
@@ -59,7 +54,7 @@ class Outputs:
             *self.contacts(),
             *self.frictions(),
             *self.losses(),
-            steps,
+            self._single(names.STEPS),
         ]
 
     def output(
@@ -87,6 +82,24 @@ class Outputs:
             depends=self.behind.at_points(symbols),
             depends_initially=self.behind.at_start(symbols),
         )
+
+    def _of(
+        self,
+        kind: Kind,
+        of: Subject,
+        words: Mapping[str, str],
+        units: Mapping[str, Unit],
+        behind: Mapping[str, Names],
+    ) -> Variable:
+        """One of a kind: what its row says, of an owner with these words, units, and names behind it."""
+        unit = units[kind.unit] if kind.unit else None
+        text, symbols = kind.text.format(**words), behind[kind.behind]
+        return self.output(of, text, unit, symbols, kind.type, discrete=kind.held)
+
+    def _single(self, quantity: str, what: str = "", behind: Names = frozenset()) -> Variable:
+        """That of which there is one."""
+        (kind,) = (k for k in names.kinds(names.MODEL) if k.quantity == quantity)
+        return self._of(kind, Subject(quantity), {"what": what}, UNITS, {kind.behind: behind})
 
     def motion(self) -> list[Variable]:
         """Coordinates, velocities, accelerations: those of the model, then those of an embedding."""
@@ -200,44 +213,44 @@ class Outputs:
         for k, c in enumerate(self.eom.constraints):
             what = f"constraint {c.name}" + (f": {c.description}" if c.description else "")
             unit, lam, rate = self._units_of(c)
-            of = Subject(names.MULTIPLIER, c.name)
-            row = self.behind.group(row=k)
-            variables.append(self.output(of, f"multiplier of {what}", lam, row))
             if isinstance(c, Nonholonomic) or c.name in self.eom.limited:
-                text, behind, unit = f"velocity residual of {what}", self.behind.rates(k), rate
+                missed, found, unit = "velocity residual", self.behind.rates(k), rate
             else:
-                kind = "gap, zero while closed," if isinstance(c, Contact) else "position residual"
-                text, behind = f"{kind} of {what}", self.behind.symbols(self.eom.f[k])
-            variables.append(self.output(Subject(names.RESIDUAL, c.name), text, unit, behind))
-            text = f"true where {of.name} is determined uniquely"
-            of = Subject(names.UNIQUE, c.name)
-            variables.append(self.output(of, text, None, entries, "Boolean"))
+                missed = (
+                    "gap, zero while closed," if isinstance(c, Contact) else "position residual"
+                )
+                found = self.behind.symbols(self.eom.f[k])
+            multiplier = names.name(names.MULTIPLIER, c.name)
+            words = {"what": what, "missed": missed, "multiplier": multiplier}
+            units = {"multiplier": lam, "missed": unit, "velocity": rate}
+            behind = {"solved": self.behind.group(row=k), "missed": found, "entries": entries}
+            for kind in names.kinds(names.CONSTRAINT):
+                of = Subject(kind.quantity, c.name)
+                variables.append(self._of(kind, of, words, units, behind))
         of_column: dict[int, list[int]] = defaultdict(list)
         for k, j in sorted(jacobian):
             of_column[j].append(k)
+        (whole,), (share,) = names.kinds(names.DIRECTION), names.kinds(names.SHARE)
         pairs = zip(self.eom.directions, self.eom.v, strict=True)
         for j, (q, v) in enumerate(() if self.eom.bare else pairs):
-            unit = generalized_force_unit(self.units[str(v)] * SECOND)
+            units = {"force": generalized_force_unit(self.units[str(v)] * SECOND)}
             touching = of_column[j]
-            symbols = self.behind.group(speed=j) if touching else frozenset()
-            text = f"generalized force of all constraints on {q}"
-            variables.append(self.output(Subject(names.FORCE, "", q), text, unit, symbols))
+            behind = {"solved": self.behind.group(speed=j) if touching else frozenset()}
+            of = Subject(names.FORCE, "", q)
+            variables.append(self._of(whole, of, {"what": q}, units, behind))
             for k in touching:
                 of = Subject(names.FORCE, self.eom.constraints[k].name, q)
-                if not names.shared(of.constraint, of.coordinate):
-                    continue
-                text = f"generalized force of constraint {of.constraint} on {q}"
-                variables.append(self.output(of, text, unit, symbols))
+                if names.shared(of.constraint, of.coordinate):
+                    words = {"what": q, "constraint": of.constraint}
+                    variables.append(self._of(share, of, words, units, behind))
         return variables
 
     def energies(self) -> list[Variable]:
         """Kinetic, potential and total energy, as far as the model has them."""
-        T, V = self.eom.kinetic, self.eom.potential
-        found = [(names.KINETIC, "kinetic energy", [T]), (names.POTENTIAL, "potential energy", [V])]
-        found.append((names.TOTAL, "kinetic plus potential energy", [T, V]))
+        found = {q: [getattr(self.eom, p) for p in parts] for q, parts in names.ENERGIES.items()}
         return [
-            self.output(Subject(name), text, ENERGY, self.behind.symbols(*parts))
-            for name, text, parts in found
+            self._single(quantity, behind=self.behind.symbols(*parts))
+            for quantity, parts in found.items()
             if None not in parts
         ]
 
@@ -273,13 +286,23 @@ class Outputs:
             if not isinstance(c, Contact):
                 continue
             solved = self.behind.of_stepped if self.eom.bare else self.behind.group(row=k)
-            behind = self.behind.known | solved  # it opens and closes by f, its rate and lambda
-            of, text = Subject(names.CONTACT, c.name), f"true while {c.name} is closed"
-            variables.append(self.output(of, text, None, behind, "Boolean"))
+            closed, impulse = self._of_contact(c, solved.union(self.behind.known))
+            variables.append(closed)
             what = f"departure{{}} from {c.name}"
             variables += self._event(names.DEPARTURE, c.name, what)
-            variables += self._closing(c)
+            told = self._event(names.CLOSING, c.name, f"closing{{0}} or impact{{0}} of {c.name}")
+            variables += [*told[:2], impulse, *told[2:]]  # the state just before an impact
         return variables
+
+    def _of_contact(self, c: Contact, modes: Names) -> list[Variable]:
+        """What its rows say; `modes`: behind f, its rate and lambda, by which it opens and closes."""
+        unit = dimension_of(sp.sympify(c.expression), self.model.units, c.name) or ONE
+        units = {"impulse": multiplier_unit(unit, False) * SECOND}
+        behind = {"modes": modes, "nothing": frozenset[str]()}
+        return [
+            self._of(kind, Subject(kind.quantity, c.name), {"what": c.name}, units, behind)
+            for kind in names.kinds(names.OF_CONTACT)
+        ]
 
     def _units_of(self, c: Constraint) -> tuple[Unit, Unit, Unit]:
         """Of its expression, of its multiplier, of the velocity that it holds."""
@@ -296,16 +319,13 @@ class Outputs:
             what = f"friction {law.name}" + (f": {law.description}" if law.description else "")
             behind = self.behind.group(row=row[law.of[0]]) | self.behind.symbols(*law.expressions)
             behind |= self.behind.known
-            text = f"true while {what} sticks (and its normal contact is closed)"
-            of = Subject(names.STICKS, law.name)
-            variables.append(self.output(of, text, None, behind, "Boolean"))
-            for name in law.of:
-                text, of = f"slip velocity G v - nu of {name}", Subject(names.SLIP, name)
-                variables.append(self.output(of, text, speed, self.behind.rates(row[name])))
-            text = f"static coefficient times normal force less |lambda| of {what}"
-            variables.append(self.output(Subject(names.MARGIN, law.name), text, force, behind))
-            text = f"power of {what}, lambda times slip velocity, never positive"
-            variables.append(self.output(Subject(names.POWER, law.name), text, POWER, behind))
+            units = {"multiplier": force, "velocity": speed, **UNITS}
+            for kind in names.kinds(names.FRICTION, names.ROW):
+                for name in law.of if kind.each == names.ROW else [law.name]:
+                    words = {"what": name if kind.each == names.ROW else what}
+                    of = Subject(kind.quantity, name)
+                    found = {"modes": behind, "rates": self.behind.rates(row.get(name, 0))}
+                    variables.append(self._of(kind, of, words, units, found))
             for events in (names.SLIPPING, names.STICKING):
                 what = f"start{{}} of {events} of {law.name}"
                 variables += self._event(events, law.name, what)
@@ -313,32 +333,24 @@ class Outputs:
 
     def losses(self) -> list[Variable]:
         """What frictions and impacts dissipate; with frictions a continuous state of model exchange."""
-        slips, of = bool(self.eom.frictions), Subject(names.DISSIPATED)
+        slips = bool(self.eom.frictions)
         if not slips and not any(isinstance(c, Contact) for c in self.stepped.constraints):
             return []
-        both = "frictions and impacts" if slips else "impacts"
-        text = f"energy that {both} dissipated so far"
-        lost = self.output(of, text, ENERGY, (), discrete=not slips)
+        lost = self._single(names.DISSIPATED, "frictions and impacts" if slips else "impacts")
+        if not slips:
+            lost = dataclasses.replace(lost, variability="discrete")
         if not self.loses:
             return [lost]
         laws = (self.behind.symbols(*law.expressions) for law in self.eom.frictions)
         solved = (symbols for *_, symbols in self.behind.groups)
-        what, text = Subject(names.DISSIPATION), "power that frictions dissipate"
-        behind = self.behind.known.union(*laws, *solved)
-        power = self.output(what, text, POWER, behind, derivative_of=lost.name)
+        power = self._single(
+            names.DISSIPATION, behind=frozenset(self.behind.known).union(*laws, *solved)
+        )
+        power = dataclasses.replace(power, derivative_of=lost.name)
         return [
             dataclasses.replace(lost, depends=(lost.name,)),
             dataclasses.replace(power, causality="local"),
         ]
-
-    def _closing(self, c: Contact) -> list[Variable]:
-        """Its impacts, those that bounce too, and where it closes without one; just before them."""
-        found = self._event(names.CLOSING, c.name, f"closing{{0}} or impact{{0}} of {c.name}")
-        unit = dimension_of(sp.sympify(c.expression), self.model.units, c.name) or ONE
-        blow = multiplier_unit(unit, False) * SECOND
-        text = f"impulse of {c.name} in its latest impact: the integral of its multiplier over time"
-        impulse = self.output(Subject(names.IMPULSE, c.name), text, blow, (), discrete=True)
-        return [*found[:2], impulse, *found[2:]]
 
     def _event(self, quantity: str, of: str, what: str) -> list[Variable]:
         """How often it happened; time, coordinates and velocities when it did so last."""
@@ -370,7 +382,7 @@ class Outputs:
                 Subject(names.ERROR, "", v.name), text.format(v.name), v.unit, (), discrete=True
             )
             for v in variables
-            if v.of.quantity in BARRED
+            if v.of.quantity in names.BARRED
             or (v.of.quantity == names.VALUE and v.of.order < 2 and v.role in ("output", "start"))
         ]
 

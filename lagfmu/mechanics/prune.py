@@ -27,8 +27,9 @@ from .form import Form
 from .joint_coordinates import start_names
 
 Indices = frozenset[int]
-SOLVED = {names.MULTIPLIER, names.UNIQUE, names.RESIDUAL, names.FORCE}  # from the full equations
-ENERGIES = {names.KINETIC, names.POTENTIAL, names.TOTAL}
+SOLVED = {
+    k.quantity for k in names.kinds(names.CONSTRAINT, names.DIRECTION)
+}  # of the full equations
 NONE: Indices = frozenset()
 
 
@@ -98,8 +99,7 @@ def subjects(form: Form) -> Callable[[str], tuple[Indices, Indices]]:
     losing = NONE.union(
         *slipping.values(), *(rows[c.name] for c in eom.constraints if isinstance(c, Contact))
     )
-    energies = {names.KINETIC: [eom.kinetic], names.POTENTIAL: [eom.potential]}
-    energies[names.TOTAL] = [eom.kinetic, eom.potential]
+    energies = {q: [getattr(eom, part) for part in parts] for q, parts in names.ENERGIES.items()}
     outputs = {o.name: o for o in eom.outputs}
 
     def subject(name: str) -> tuple[Indices, Indices]:
@@ -210,12 +210,13 @@ def only(
 
 def silent(eom: EquationsOfMotion, outputs: Collection[str]) -> EquationsOfMotion:
     """Without the energies and outputs of the model's own that are not read."""
-    kinetic = bool({names.KINETIC, names.TOTAL, names.DISSIPATED} & set(outputs))
-    potential = bool({names.POTENTIAL, names.TOTAL, names.DISSIPATED} & set(outputs))
+    read = {part for name in outputs for part in names.ENERGIES.get(name, ())}
+    if names.DISSIPATED in outputs:
+        read = {"kinetic", "potential"}
     return replace(
         eom,
-        kinetic=eom.kinetic if kinetic else None,
-        potential=eom.potential if potential else None,
+        kinetic=eom.kinetic if "kinetic" in read else None,
+        potential=eom.potential if "potential" in read else None,
         outputs=own(eom, outputs),
     )
 
@@ -253,7 +254,7 @@ def read_only(form: Form, outputs: Collection[str]) -> Form:
     if not js:
         own = replace(reduction.reduced, constraints=reduction.constraints, outputs=eom.outputs)
         return replace(form, equations=silent(own, outputs), reduction=None)
-    rates = [n for n in outputs if names.read(n).order or names.read(n).quantity in ENERGIES]
+    rates = [n for n in outputs if names.read(n).order or names.read(n).quantity in names.ENERGIES]
     rates += [o.name for o in eom.outputs if o.name in outputs and symbols_of(o) & set(eom.v)]
     moving = bool(set(rates) - of_s)  # of what is read, velocities are asked for
     nothing = sp.SparseMatrix(len(js), len(js), {})

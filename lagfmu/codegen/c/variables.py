@@ -122,17 +122,10 @@ ALONE = {  # where a value lies of which there is one
     names.STEP: "STEP",
     names.MAXIMUM_STEP: "MAXIMUM_STEP",
     names.MAXIMUM_STEPS: "MAXIMUM_STEPS",
-    names.STEPS: "STEPS",
-    names.KINETIC: "KINETIC",
-    names.POTENTIAL: "POTENTIAL",
-    names.TOTAL: "TOTAL",
-    names.DISSIPATED: "LOST",
-    names.DISSIPATION: "LOST_RATE",
     names.SENSITIVITY_VALID: "SENSITIVITY_VALID",
+    **{kind.quantity: kind.place for kind in names.kinds(names.MODEL)},
 }
-OF_ROW = {names.MULTIPLIER: "LAMBDA", names.UNIQUE: "UNIQUE", names.RESIDUAL: "RESIDUAL"}
-OF_CONTACT = {names.CONTACT: "CONTACT", names.IMPULSE: "IMPULSE"}
-OF_FRICTION = {names.STICKS: "STICKS", names.MARGIN: "MARGIN", names.POWER: "POWER"}
+KINDS = {(kind.quantity, kind.each == names.SHARE): kind for kind in names.OUTPUTS}
 
 
 class Places:
@@ -178,14 +171,12 @@ class Places:
             return ALONE[what], 0, NONE
         if what == names.UNIQUE and c in self.unique:
             return "OUTPUT_UNIQUE", self.unique[c], NONE
-        if what in OF_ROW:
-            return OF_ROW[what], self.rows[c], NONE
         if what == names.RESIDUAL_RATE:
             k = self.rows[c]
             last = rate == (1 if self.full.rows[k].kind == NONHOLONOMIC else 2)
             return "RESIDUAL_ACCELERATION" if last else "RESIDUAL_RATE", k, NONE
-        if what in OF_CONTACT:
-            return OF_CONTACT[what], self.contacts[c], NONE
+        if (kind := KINDS.get((what, bool(c and q)))) is not None:
+            return kind.place, *self._number(kind.each, c, q)
         if of.head in names.EVENTS:
             state = names.derivative(q, rate)
             part, index = self.states[state] if q else (what.partition(".")[2], 0)
@@ -193,16 +184,19 @@ class Places:
                 c
             ]
             return f"{of.head}_{part}".upper(), index, i
-        if what in OF_FRICTION:
-            return OF_FRICTION[what], self.frictions[c], NONE
-        if what == names.SLIP:
-            i, j = self.slips[c]
-            return "SLIP", 2 * i + j, i
-        if what == names.FORCE and c:
-            return "SHARE", self.shares[self.rows[c], self.directions[q]], NONE
-        if what == names.FORCE:
-            return "FORCE", self.directions[q], NONE
         return self.own[v.name] if what == names.OWN else self.values[v.name]
+
+    def _number(self, each: str, c: str, q: str) -> tuple[int, int]:
+        """Index and contact of an output of which there is one for each."""
+        if each == names.ROW:
+            i, j = self.slips[c]
+            return 2 * i + j, i
+        if each == names.SHARE:
+            return self.shares[self.rows[c], self.directions[q]], NONE
+        if each == names.DIRECTION:
+            return self.directions[q], NONE
+        owners = {names.CONSTRAINT: self.rows, names.OF_CONTACT: self.contacts}
+        return owners.get(each, self.frictions)[c], NONE
 
 
 def _numbered(known: Iterable[str]) -> dict[str, int]:
