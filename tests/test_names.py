@@ -122,7 +122,7 @@ def test_of_a_mechanism_the_joints_come_first():
 
 @pytest.mark.parametrize("kind", names.OUTPUTS, ids=lambda kind: f"{kind.quantity} {kind.each}")
 def test_what_an_fmu_reports_stands_in_the_documentation(kind: names.Kind) -> None:
-    """Of each kind of output a page says what it is: lambda.surface, energy.total, closing.surface.impulse."""
+    """Of each kind of output a page says what it is: lambda.surface, energy.total."""
     pages = "".join(
         (DOCS / name).read_text(encoding="utf-8") for name in ("variables.md", "friction.md")
     )
