@@ -4,6 +4,8 @@
  * them are found at once.  What a state remembers of events lies ready in the column. */
 #include "derivatives.h"
 
+#include <float.h>
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -148,12 +150,15 @@ const Variable *derivatives_of(int j) { return is_derivative(j) ? &VARIABLES[VAR
 
 /* ------------------------------------------------------------------ */
 
+/* Below the normal numbers a derivative is what rounding has left of numbers that cancel. */
+static double shown(double derivative) { return fabs(derivative) < DBL_MIN ? 0 : derivative; }
+
 static Status get_derivative(Instance *x, const Variable *v, double *value) {
     struct Derived *all = x->derived;
     const int at = (int)(v - VARIABLES) - all->first;
     *value = 0;
     if (all->done == x->version && v->place == AT_SENSITIVITY) {
-        *value = all->value[at];
+        *value = shown(all->value[at]);
         return OK;
     }
     if (instance_observe_unique(x) != OK) return FAILED;
@@ -163,7 +168,7 @@ static Status get_derivative(Instance *x, const Variable *v, double *value) {
         return OK;
     }
     if (all->done != x->version && derive(x) != OK) return FAILED;
-    *value = all->value[at];
+    *value = shown(all->value[at]);
     return OK;
 }
 

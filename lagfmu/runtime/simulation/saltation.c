@@ -131,6 +131,8 @@ static Status find_columns(Solver *s, const Jump *jump) {
         status = saltation_map(s, jump, c, x->dt[c]);
         if (x->limit >= 0) take_what_is_known(s, c);
         memcpy(x->found + c * size, x->change, bytes);
+        for (int j = 0; j < size && status == OK; j++)
+            if (!isfinite(x->change[j])) status = fail(&s->why, "they are beyond a double");
     }
     memcpy(s->state.block, x->after, s->state.block_size);
     s->state.now = now;

@@ -184,6 +184,7 @@ Status segment_step(Solver *s, Integrator *i, double t_bound, double longest) {
     }
     const Ode ode = equations_at(s, i->t);
     if (i->method->step(i, &ode, &c, t_bound) != OK) return FAILED;
+    if (s->columns > 0) OPTIONAL.variation->stepped(s, i);
     return s->settings.method == RK4 ? check_fixed_step(s, i) : OK;
 }
 
@@ -194,7 +195,9 @@ Status segment_rate(Solver *s, Integrator *i) {
 
 Status segment_prepare_dense(Solver *s, Integrator *i) {
     const Ode ode = equations_at(s, i->t);
-    return i->method->prepare_dense == NULL ? OK : i->method->prepare_dense(i, &ode);
+    if (i->method->prepare_dense != NULL && i->method->prepare_dense(i, &ode) != OK) return FAILED;
+    if (s->columns > 0) OPTIONAL.variation->stepped(s, i);
+    return OK;
 }
 
 int segment_dense_rough(Solver *s, Integrator *i) {

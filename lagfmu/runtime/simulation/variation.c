@@ -11,6 +11,7 @@
 #include "variation.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "saltation.h"
 #include "segment.h"
@@ -37,6 +38,26 @@ static void variation_rates(Solver *s, double t, const double *y, double *rates)
     for (int c = 0; c < s->columns && *s->state.varied; c++)
         if (rates_along(s, at, y, y + n * (1 + c), s->column[c].parameter, rates + n * c) != OK) saltation_end(s);
     if (!*s->state.varied) memset(rates, 0, (size_t)(n * s->columns) * sizeof *rates);
+}
+
+static int arrays_of_step(const Integrator *i) { return 4 + i->method->dense_arrays; }
+
+/* What is left of a step: array k. */
+static double *left_of_step(const Integrator *i, int k) {
+    double *const one[] = {i->y, i->y_old, i->f, i->f_old};
+    return k < 4 ? one[k] : i->dense + (k - 4) * i->ny;
+}
+
+static void variation_stepped(Solver *s, Integrator *i) {
+    const int n = system_states(s->system);
+    for (int k = 0; k < arrays_of_step(i) && *s->state.varied; k++)
+        for (int j = n; j < i->ny && *s->state.varied; j++) {
+            if (isfinite(left_of_step(i, k)[j])) continue;
+            (void)fail(&s->why, "they are beyond a double at t = %.17g s", i->t);
+            saltation_end(s);
+        }
+    for (int k = 0; k < arrays_of_step(i) && !*s->state.varied; k++)
+        memset(left_of_step(i, k) + n, 0, (size_t)(i->ny - n) * sizeof(double));
 }
 
 /* ------------------------------------------------------------------ projection */
@@ -101,5 +122,5 @@ static Status variation_project(Solver *s, Instant at, double *y) {
     return OK;
 }
 
-SHARED_VALUE const Variation VARIATION = {saltation_layout, variation_rates, variation_project, saltation_start,
+SHARED_VALUE const Variation VARIATION = {saltation_layout, variation_rates, variation_stepped, variation_project, saltation_start,
                                           saltation_pass,   saltation_jump,  unwatched_look,    saltation_ended};

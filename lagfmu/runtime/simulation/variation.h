@@ -22,6 +22,9 @@ typedef struct {
     void (*layout)(Solver *s, Arena *scratch);
     /* Rates of the columns at y (solver_width()), of the latest motion. */
     void (*rates)(Solver *s, double t, const double *y, double *rates);
+    /* After a step of `i`, and its dense output: columns that are no numbers end, and those that have ended in it are 0 in
+     * all that is left of it. */
+    void (*stepped)(Solver *s, Integrator *i);
     /* The columns behind y, which lies on the constraints, moved onto their tangents. */
     Status (*project)(Solver *s, Instant at, double *y);
     /* `map` starts the run (it has, when this is called): the columns there. */
