@@ -42,6 +42,8 @@ from .model.spline import Spline
 from .studio.fit.experiment import Experiment
 from .studio.fit.result import Fit
 from .studio.fit.solve import fit
+from .studio.linearize.linearize import linearize
+from .studio.linearize.result import Linearization
 from .studio.live.command import play
 from .studio.report.report import report
 from .studio.sensitivity.local import sensitivity
@@ -70,6 +72,7 @@ __all__ = [
     "Input",
     "LagfmuError",
     "Line",
+    "Linearization",
     "Model",
     "Nonholonomic",
     "Output",
@@ -94,6 +97,7 @@ __all__ = [
     "force_of_constraint",
     "from_lagranges_method",
     "initial",
+    "linearize",
     "multiplier",
     "norm",
     "output",

@@ -10,6 +10,7 @@ from ..fmu.archive import tool
 from ..verification.exit_codes import EXIT_CODES
 from .commands.build import build
 from .commands.fit import fit
+from .commands.linearize import linearize
 from .commands.new import new
 from .commands.page import page
 from .commands.reference import reference
@@ -36,6 +37,7 @@ COMMANDS = (
     sweep,
     fit,
     sensitivity,
+    linearize,
     report,
 )
 EPILOG = "Exit codes: " + "; ".join(f"{code} {text}" for code, text in EXIT_CODES.items()) + "."

@@ -11,12 +11,14 @@ from typing import Any
 
 import fmpy
 from fmpy.fmi2 import (
+    FMU2Model,
     FMU2Slave,
     fmi2CallbackAllocateMemoryTYPE,
     fmi2CallbackFreeMemoryTYPE,
     fmi2CallbackFunctions,
     fmi2CallbackLoggerTYPE,
 )
+from fmpy.fmi3 import FMU3Model
 from fmpy.logging import addLoggerProxy
 
 from .binary3 import Slave3
@@ -62,6 +64,25 @@ def instantiated(folder: Path, description: Any, name: str, log: bool) -> FMU2Sl
     if is_ours(slave) and not log:
         slave.setDebugLogging(True, ["logStatusWarning"])
     return slave
+
+
+def exchanging(folder: Path, description: Any, name: str) -> FMU2Model | FMU3Model:
+    """An instance for model exchange of the FMU that lies unpacked in `folder`, likewise."""
+    library = {
+        "instanceName": name,
+        "guid": description.guid,
+        "modelIdentifier": description.modelExchange.modelIdentifier,
+        "unzipDirectory": str(folder),
+    }
+    with contextlib.chdir("."):
+        if description.fmiVersion == "2.0":
+            one = FMU2Model(**library)
+            one.instantiate(callbacks=_callbacks())
+        else:
+            one = FMU3Model(**library)
+            one.instantiate(logMessage=_log)
+    one.setDebugLogging(True, ["logStatusWarning"])
+    return one
 
 
 def is_ours(slave: Any) -> bool:

@@ -79,7 +79,9 @@ Status instance_change(const Instance *x, const Variable *v, Direction d, double
         *change = exchange_change_of_vdot(x, i);
         return isfinite(*change) ? OK : FAILED;
     }
-    if (x->apart && v->place != AT_Q && v->place != AT_V && v->place != AT_QDOT) return FAILED;
+    const int kinematic = v->place == AT_Q || v->place == AT_V || v->place == AT_QDOT ||
+                          (v->place == AT_RESIDUAL && !embedded); /* no accelerations are asked for */
+    if (x->apart && !kinematic) return FAILED;
     if (v->place == AT_LOST && EXCHANGE_LOST && x->exchange) {
         *change = x->dlost;
         return OK;

@@ -1,0 +1,172 @@
+"""Where a mechanism rests: Newton's method on the positions that the constraints allow.
+
+At rest, v = 0 and q' = 0, the accelerations a of the coordinates z that are left free vanish:
+
+    da/dz dz = -a   (least squares; of all dz the least),   q <- s(q + T dz) ,   f(q) = 0 by Gauss and Newton
+
+with contacts and frictions as they stand.  A step is as long as the accelerations go on linearly.  Where a
+has a part that no dz takes away, as at the level of a pendulum's pivot, one step goes where the forces push.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ... import names
+from ...errors import SimulationError
+from .chart import Chart, Rows, chart
+from .exchange import Exchange, Floats
+
+ROUNDS, PUSHES = 100, 12  # of Newton's method; of steps along the forces
+NEARLY, GROWS, SHORTEST = (
+    0.5,
+    4.0,
+    1e-4,
+)  # how linear a step is; how its bound changes; the shortest bound
+FARTHEST = 0.4  # part of a coordinate's size, at first
+ARRIVED = 1e-13  # likewise
+SETTLED = 1e-6  # likewise: where it no longer gets closer
+UNMET = 1e-6  # part of the accelerations that no displacement takes away
+LATER = (0.37, 1.1)  # s: forces at rest are those of these times too
+
+
+def find(ex: Exchange, rows: Rows, inputs: Sequence[str], t: float) -> Chart:
+    """Move `ex` to the equilibrium that Newton's method finds; the chart there.
+
+    Raises SimulationError where there is none.
+    """
+    x = np.where(ex.coordinate, ex.state(), 0.0)
+    ex.put(x)
+    _check_rest(ex, rows)
+    pushes, last, radius = 0, np.inf, FARTHEST
+    unheld = ""
+    for _ in range(ROUNDS):
+        now = chart(ex, rows, inputs)
+        a = now.accelerations(ex)
+        dz, unmet = _step(ex, now, a)
+        if unmet:
+            pushes, unheld = pushes + 1, unheld or _unheld(ex, now, a)
+            if pushes > PUSHES:
+                raise SimulationError(unheld)
+            dz = now.along(a)
+            dz *= FARTHEST / max(_far(ex, now, dz), 1e-300)
+            _move(ex, rows, inputs, now, dz)
+            continue
+        far = _far(ex, now, dz)
+        if far <= ARRIVED or (far < SETTLED and far >= last):
+            _check_time(ex, t)
+            return now
+        last = far
+        radius = _trusted(ex, rows, inputs, now, dz, radius)
+    raise SimulationError(
+        f"no equilibrium was found in {ROUNDS} steps of Newton's method from the start: start nearer to it "
+        "(--set NAME=VALUE)"
+    )
+
+
+def _far(ex: Exchange, now: Chart, dz: Floats) -> float:
+    """How far that moves any coordinate, in its size."""
+    moved = now.T[:, : now.places] @ dz
+    return float((np.abs(moved) / ex.size)[ex.coordinate].max(initial=0.0))
+
+
+def _step(ex: Exchange, now: Chart, a: Floats) -> tuple[Floats, bool]:
+    """dz of the coordinates, and whether a has a part that it does not take away."""
+    if not len(a):
+        return np.zeros(now.places), False
+    place = {n: k for k, n in enumerate(ex.states)}
+    size = np.array([ex.size[place[n]] for n in now.names[: now.places]])
+    K = (now.E @ now.A)[now.places :, : now.places] * size
+    weight = np.abs(K).max(axis=1, initial=0.0)
+    weight = 1 / np.where(weight > 0, weight, max(float(weight.max(initial=0.0)), 1.0))
+    dz, *_ = np.linalg.lstsq(weight[:, None] * K, -weight * a, rcond=1e-9)
+    left = weight * (K @ dz + a)
+    whole = float(np.abs(weight * a).max())
+    unmet = whole > 1e-10 and float(np.abs(left).max()) > UNMET * whole
+    return dz * size, unmet
+
+
+def _trusted(
+    ex: Exchange, rows: Rows, inputs: Sequence[str], now: Chart, dz: Floats, radius: float
+) -> float:
+    """A step of at most `radius`, smaller until the next one of the same K is about what is left of this; the
+    radius for the next."""
+    x, far = ex.state(), _far(ex, now, dz)
+    while True:
+        part = min(1.0, radius / far)
+        _move(ex, rows, inputs, now, part * dz)
+        left, _ = _step(ex, now, now.accelerations(ex))
+        off = _far(ex, now, left - (1 - part) * dz) / (part * far)
+        if off < NEARLY or radius < SHORTEST:
+            return radius * (GROWS if part < 1 else 1.0)
+        if off < 1:
+            return radius
+        ex.put(x)
+        radius = min(radius, far) / GROWS
+
+
+def _move(ex: Exchange, rows: Rows, inputs: Sequence[str], now: Chart, dz: Floats) -> None:
+    """By dz, and back onto f = 0."""
+    x = ex.state() + np.where(ex.coordinate, now.T[:, : now.places] @ dz, 0.0)
+    ex.put(x)
+    if not rows.places:
+        return
+    J = now.J * ex.size
+    best = np.inf
+    for k in range(30):
+        f = ex.read(rows.places)
+        if not np.abs(f).max() < best:
+            break
+        best = float(np.abs(f).max())
+        if k % 3 == 2:
+            J = ex.along(rows.places, inputs, np.eye(len(x))) * ex.size
+        back, *_ = np.linalg.lstsq(J, -f, rcond=1e-9)
+        ex.put(ex.state() + np.where(ex.coordinate, ex.size * back, 0.0))
+
+
+def _check_rest(ex: Exchange, rows: Rows) -> None:
+    """Raises SimulationError where constraints move what they hold."""
+    q, rate = ex.coordinate, ex.rate()
+    moving = [n for n, r, s in zip(ex.rates, rate, ex.size, strict=True) if abs(r) > 1e-12 * s]
+    moving = [n for n, of in zip(ex.rates, q, strict=True) if of and n in moving]
+    told = [*rows.speeds, *(n for n in map(names.derivative, rows.places) if n in ex.rules)]
+    driven = [n for n, r in zip(told, ex.read(told), strict=True) if abs(r) > 1e-12]
+    if moving or driven:
+        raise SimulationError(
+            f"there is no equilibrium: with all velocities 0 {', '.join(moving + driven)} "
+            "would not be 0, for a constraint moves: stop what moves it (--set 'der(INPUT)=0'), or linearize "
+            "at a time of the motion (--at T)"
+        )
+
+
+def _check_time(ex: Exchange, t: float) -> None:
+    """Raises SimulationError where the forces at rest are others later."""
+    now = ex.rate()
+    size = np.abs(now) + ex.size
+    for later in LATER:
+        ex.at(t + later)
+        if (np.abs(ex.rate() - now) > 1e-9 * size).any():
+            raise SimulationError(
+                "there is no equilibrium: forces or constraints depend on time: linearize at a time of the "
+                "motion (--at T)"
+            )
+    ex.at(t)
+
+
+def _unheld(ex: Exchange, now: Chart, a: Floats) -> str:
+    """What to say of accelerations that no displacement takes away."""
+    held = sorted(zip(np.abs(a), now.names[now.places :], a, strict=True), reverse=True)
+    told = [
+        f"{names.rate_of(n)} = {value:.6g}" for size, n, value in held if size > UNMET * held[0][0]
+    ]
+    stands = [n for n in ex.rules if names.read(n).quantity == names.CONTACT]
+    values = zip(stands, ex.read(stands), strict=True)
+    contacts = [f"{names.read(n).constraint} {'closed' if on else 'open'}" for n, on in values]
+    stand = f" ({', '.join(contacts)})" if contacts else ""
+    return (
+        f"there is no equilibrium as contacts and frictions stand{stand}: at rest {', '.join(told[:3])} (SI "
+        "units), and no displacement takes that away: add what holds it (a spring, a friction, an input's "
+        "value), or linearize at a time of the motion (--at T)"
+    )

@@ -1,0 +1,276 @@
+"""What `linearize` found: matrices, poles and modes, as tables, words, JSON and MAT."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.markup import escape
+from rich.table import Table
+
+from ...errors import UsageError
+from ...fmu.write import write_whole
+from ...model.units import for_reading
+from ...page.table import as_text, new_table
+from .exchange import Floats
+from .poles import Complex, Poles
+
+LEAST = 1e-9  # part of the fastest pole, that is no growth and no damping
+SHOWN, MOVES = (
+    4,
+    0.05,
+)  # coordinates of a mode in words; part of the largest that one moves at least
+CHANGES = 1e-3  # of A along the motion
+
+
+@dataclass(frozen=True)
+class Linearization:
+    """z' = A z + B u, y = C z + D u beside a point: z, u and y are differences from their values there.
+
+    `states` of z are coordinates and velocities that the constraints leave free, in SI (`units`);
+    `at_states`, `at_inputs`, `at_outputs`: their values at the point, `point` those of all states of the FMU,
+    `rates`: z' there, 0 at an `equilibrium`.  `poles.values` [1/s] with their `vectors`;
+    `shapes` (coordinates, poles): how all `coordinates` move in each mode, `sizes` what is much of each.
+    `redundant`: constraints whose multipliers are not unique; `stuck`: what friction holds; `error`: the
+    estimated relative error of differences (None: derivatives are the FMU's own); `drift`: how much A changes
+    along the motion, of itself, in the time of the fastest pole.
+    """
+
+    name: str
+    time: float
+    equilibrium: bool
+    states: tuple[str, ...]
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    A: Floats
+    B: Floats
+    C: Floats
+    D: Floats
+    point: Mapping[str, float]
+    at_states: Floats
+    at_inputs: Floats
+    at_outputs: Floats
+    rates: Floats
+    poles: Poles
+    coordinates: tuple[str, ...]
+    shapes: Complex
+    sizes: Floats
+    units: Mapping[str, str]
+    redundant: tuple[str, ...]
+    stuck: tuple[str, ...]
+    error: float | None
+    drift: float
+
+    @property
+    def stability(self) -> str:
+        """In words."""
+        values, zeros = self.poles.values, self.poles.zeros
+        least = LEAST * float(np.abs(values).max(initial=0.0))
+        if self.error is not None:
+            least *= max(1.0, self.error / 1e-12)
+        growth = float(values.real.max(initial=-np.inf))
+        if growth > least:
+            return f"unstable: grows by e in {1 / growth:.6g} s"
+        if len(self.poles.indifferent) > 1:
+            return "unstable to first order: displaced, it drifts on"
+        if growth > -least:
+            return "undamped: to first order neither stable nor unstable"
+        if zeros:
+            return "stable, but for what is indifferent"
+        return "asymptotically stable" if len(values) else "nothing moves"
+
+    def mode(self, k: int) -> dict[str, complex]:
+        """How coordinates move in the mode of pole k: that which moves furthest, in its size, by 1."""
+        shape = self.shapes[:, k]
+        order = np.argsort(-np.abs(shape) / self.sizes, kind="stable")
+        if not len(order) or not np.abs(shape[order[0]]) > 0:
+            return {}
+        far = np.abs(shape) / self.sizes
+        moving = [j for j in order if far[j] >= MOVES * far[order[0]]]
+        return {self.coordinates[j]: complex(shape[j] / shape[order[0]]) for j in moving}
+
+    def words(self, k: int) -> str:
+        """That, the first few."""
+        told = []
+        for name, part in list(self.mode(k).items())[:SHOWN]:
+            unit = for_reading(self.units.get(name, "1"))
+            phase = round(float(np.degrees(np.angle(part))))
+            way = {0: "", 180: " against", -180: " against"}.get(phase, f" at {phase} deg")
+            told.append(f"{name} {abs(part):.3g}{f' {unit}' if unit else ''}{way}")
+        return ", ".join(told)
+
+    def summary(self) -> str:
+        """One line."""
+        what = "equilibrium" if self.equilibrium else f"state at t = {self.time:g} s"
+        n, zeros = len(self.states), self.poles.zeros
+        also = f", {zeros} of them 0" * bool(zeros)
+        return f"{self.name}: {what}, {n} states, {n} poles{also}; {self.stability}"
+
+    def tables(self) -> list[Table]:
+        """The point, and the poles that are not zero, a conjugate pair once."""
+        point = new_table("where", "state", "value", "unit", words=["state", "unit"])
+        for name, value in zip(self.states, self.at_states, strict=True):
+            point.add_row(
+                escape(name), f"{_clean(value):.9g}", for_reading(self.units.get(name, "1"))
+            )
+        head = ("pole [1/s]", "frequency [Hz]", "damping", "time [s]", "moves")
+        drawn = new_table("modes", *head, text=["moves"])
+        for k, s in enumerate(self.poles.values):
+            if s.imag < 0:
+                continue
+            waves = abs(s.imag) > 0
+            real = s.real if abs(s.real) > LEAST * abs(s) else 0.0
+            pole = f"{real:.9g}" + (f" +- {s.imag:.9g}i" if waves else "")
+            drawn.add_row(
+                pole,
+                f"{abs(s) / (2 * np.pi):.6g}" if waves else "",
+                f"{-real / abs(s) + 0.0:.4f}",
+                f"{1 / abs(real):.5g}" if real else "",
+                escape(self.words(k)),
+            )
+        return [point, drawn]
+
+    def remarks(self) -> list[str]:
+        """What is indifferent, and what to know."""
+        told = []
+        if self.poles.indifferent:
+            first, *later = self.poles.indifferent
+            told.append(f"indifferent (zero poles): {', '.join(first)}")
+            told += [
+                f"zero poles behind these, which let them drift: {', '.join(more)}"
+                for more in later
+            ]
+        if self.stuck:
+            told.append(f"held by friction, wherever it sticks: {', '.join(self.stuck)}")
+        if self.redundant:
+            told.append(
+                f"not unique: {', '.join(self.redundant)} (redundant constraints); they are no outputs"
+            )
+        if not self.equilibrium:
+            least = np.abs(self.rates).max(initial=0.0)
+            told.append(
+                f"no equilibrium: rates up to {least:.6g} (SI); A, B, C, D are those of this instant"
+            )
+        if self.drift > CHANGES:
+            told.append(
+                f"A changes along the motion ({self.drift:.1g} of itself in the time of its fastest pole): "
+                "its poles are no exponents of the motion"
+            )
+        if self.error is not None:
+            told.append(
+                "the FMU has no directional derivatives (frictions): differences of its functions, of sixth "
+                f"order, a displacement is a thousandth of a size, estimated error {self.error:.1e}"
+            )
+        return told
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything, for JSON."""
+        return {
+            "fmu": self.name,
+            "time": self.time,
+            "equilibrium": self.equilibrium,
+            "stability": self.stability,
+            "states": self._listed(self.states, self.at_states),
+            "inputs": self._listed(self.inputs, self.at_inputs),
+            "outputs": self._listed(self.outputs, self.at_outputs),
+            "rates": self.rates.tolist(),
+            "point": dict(self.point),
+            **{n: getattr(self, n).tolist() for n in "ABCD"},
+            "poles": [
+                {
+                    "real": float(s.real),
+                    "imag": float(s.imag),
+                    "frequency_hz": abs(s) / (2 * np.pi),
+                    "damping": float(-s.real / abs(s)),
+                    "moves": {n: [x.real, x.imag] for n, x in self.mode(k).items()},
+                }
+                for k, s in enumerate(self.poles.values)
+            ],
+            "zero_poles": [list(step) for step in self.poles.indifferent],
+            "redundant": list(self.redundant),
+            "held_by_friction": list(self.stuck),
+            "error_of_differences": self.error,
+            "drift": self.drift,
+        }
+
+    def _listed(self, those: tuple[str, ...], values: Floats) -> list[dict[str, Any]]:
+        return [
+            {"name": n, "value": float(x), "unit": self.units.get(n, "1")}
+            for n, x in zip(those, values, strict=True)
+        ]
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write .json, or .mat (MATLAB: A, B, C, D, names, values, poles).  Raises UsageError for another."""
+        out = Path(path)
+        if out.suffix == ".json":
+            from ...verification.junit import text_of
+
+            write_whole(out, text_of(self.to_dict()).encode())
+        elif out.suffix == ".mat":
+            self._to_mat(out)
+        else:
+            raise UsageError(f"{str(out)!r} ends in {out.suffix!r}, expected .json or .mat")
+        return out
+
+    def _to_mat(self, out: Path) -> None:
+        import io
+
+        from scipy.io import savemat
+
+        buffer = io.BytesIO()
+        named: dict[str, Any] = {
+            n: np.array(getattr(self, n), dtype=object) for n in ("states", "inputs", "outputs")
+        }
+        savemat(
+            buffer,
+            {n: getattr(self, n) for n in "ABCD"}
+            | named
+            | {"x0": self.at_states, "u0": self.at_inputs, "y0": self.at_outputs}
+            | {"poles": self.poles.values, "zero_poles": float(self.poles.zeros)},
+        )
+        write_whole(out, buffer.getvalue())
+
+    def to_scipy(self) -> Any:
+        """scipy.signal.StateSpace.  Raises UsageError where nothing moves."""
+        from scipy.signal import StateSpace
+
+        if not self.states:
+            raise UsageError(f"{self.name} has no states here: nothing moves")
+        return StateSpace(*self._with_columns())
+
+    def _with_columns(self) -> tuple[Floats, Floats, Floats, Floats]:
+        """SciPy takes no system without inputs or outputs: one that does nothing stands for none."""
+        n = len(self.states)
+        B = self.B if self.inputs else np.zeros((n, 1))
+        C = self.C if self.outputs else np.zeros((1, n))
+        D = self.D if self.inputs and self.outputs else np.zeros((len(C), B.shape[1]))
+        return self.A, B, C, D
+
+    def to_control(self) -> Any:
+        """control.StateSpace with these names, of the package python-control (`pip install control`)."""
+        try:
+            import control  # type: ignore[import-not-found, import-untyped, unused-ignore]
+        except ImportError:
+            raise UsageError("python-control is not installed: pip install control") from None
+        return control.ss(
+            *(self.A, self.B, self.C, self.D),
+            states=[_plain(n) for n in self.states],
+            inputs=[_plain(n) for n in self.inputs],
+            outputs=[_plain(n) for n in self.outputs],
+        )
+
+    def __repr__(self) -> str:
+        return "\n".join([self.summary(), as_text(*self.tables()), *self.remarks()])
+
+
+def _clean(x: float) -> float:
+    return 0.0 if abs(x) < 1e-15 else float(x)
+
+
+def _plain(name: str) -> str:
+    """python-control keeps the dot for systems of systems."""
+    return name.replace(".", "_")
