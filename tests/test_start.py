@@ -11,6 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from fmpy import read_model_description, simulate_fmu
+from fmpy.fmi1 import FMICallException
+from instance import instance
 from linkages import pinned_rod
 from sympy import cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
@@ -317,6 +319,63 @@ def test_a_start_that_is_infinite_at_what_is_set_is_refused(target: str, built: 
     assert begun(fmu, m=1.5)[0]["x"] == pytest.approx(1.5)
     with pytest.raises(SimulationError, match="start value of x is an expression of parameters"):
         simulate(fmu, start_values={"m": 2.0})
+
+
+def test_what_has_no_start_has_one_as_soon_as_something_else_is_set(built: Built) -> None:
+    """A bob on a rod of L = 1 m and a rail at y = H + V t: above the rod's end there is no place for it, and
+    each question is told so; below it, after a reset and in a state saved before, x = sqrt(L^2 - y^2)."""
+    m, g, L, H, V = symbols("m g L H V", positive=True)
+    model = Model(
+        name="Railed",
+        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2 - m * g * y,
+        coordinates={x: "m", y: "m"},
+        constraints=[
+            Holonomic("rod", x**2 + y**2 - L**2),
+            Holonomic("rail", y - H - V * dynamicsymbols._t),
+        ],
+        parameters=[
+            Parameter(m, 1.0, "kg"),
+            Parameter(g, 9.81, "m/s^2"),
+            Parameter(L, 1.0, "m"),
+            Parameter(H, 0.6, "m"),
+            Parameter(V, 0.1, "m/s"),
+        ],
+        start={x: 0.8, y: 0.6},
+    )
+    fmu = built(model, Scene("Railed", tolerance=1e-9))
+    with instance(fmu) as one:
+
+        def begins(start_time: float = 0.0) -> None:
+            one.fmu.setupExperiment(startTime=start_time)
+            one.fmu.enterInitializationMode()
+
+        def refused() -> None:
+            told = len(one.log)
+            for _ in range(3):
+                with pytest.raises(FMICallException):
+                    one.get("lambda.rod")
+            texts = [text for _, _, text in one.log[told:]]
+            assert len(texts) == 3
+            assert len({*texts}) == 1
+
+        begins()
+        saved = one.fmu.getFMUState()
+        one.set("H", 1.5)
+        refused()
+        one.set("L", 2.5)
+        assert one.get("x") == pytest.approx(2.0)
+        one.set("L", 1.0)
+        refused()
+        one.fmu.setFMUState(saved)
+        assert one.get("x") == pytest.approx(0.8)
+        one.set("H", 1.5)
+        refused()
+        one.fmu.reset()
+        begins(start_time=5.0)
+        refused()
+        one.set("V", 0.04)
+        assert one.get("y") == pytest.approx(0.8)
+        one.fmu.freeFMUState(saved)
 
 
 def test_the_minimal_formulation_starts_its_own_coordinates() -> None:

@@ -25,6 +25,7 @@ Status instance_set_up(Instance *x, const double *tolerance, double start, const
     x->start_time = start;
     x->solver.stop_time = stop != NULL ? *stop : HUGE_VAL;
     x->started = 0;
+    x->version += 1;
     return OK;
 }
 

@@ -55,6 +55,8 @@ typedef struct Instance {
     unsigned long observed, evaluated; /* of `seen`; of the accelerations of exchange.c */
     unsigned long motion, evaluations; /* ... while this was the solver's latest evaluation */
     unsigned long followed; /* the state goes with a motion that was set; as it was in `backup` */
+    unsigned long refused;  /* the values that are set have no start, and why */
+    Why refusal;
     Observed seen;          /* what can be read at the state */
     Sensitivity along;      /* of the full system, where there is an embedding */
     Instant at;             /* of instance_factor() */
@@ -133,7 +135,7 @@ SHARED Status instance_initialize(Instance *x);
 /* Is there a communication step from t to t + h [s] now? */
 SHARED Status instance_steppable(Instance *x, double t, double h);
 
-/* The consistent start, unless it is known already. */
+/* The consistent start, unless it is known already, or that there is none. */
 SHARED Status instance_start(Instance *x);
 
 /* The place among (q, v, energy dissipated) of a variable that is a continuous state, or -1.  One that an importer's

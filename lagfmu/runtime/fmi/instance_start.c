@@ -154,10 +154,16 @@ static Status find_start(Instance *x) {
 Status instance_start(Instance *x) {
     Solver *s = &x->solver;
     if (x->started) return x->unsettled ? instance_settle_states(x) : OK;
+    if (x->refused == x->version) {
+        s->why = x->refusal;
+        return FAILED;
+    }
     choose_settings(x);
     s->drive.since = x->start_time;
     find_priorities(x);
     if (find_start(x) != OK) {
+        x->refused = x->version;
+        x->refusal = s->why;
         solver_clear(s, x->start_time);
         return FAILED;
     }
