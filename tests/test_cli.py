@@ -237,6 +237,7 @@ MEANT_WRONG = {  # each command with what cannot be meant
     "fit": ("MODEL", "nothing.csv", "--free", "nothing"),
     "report": ("MODEL", "--out", "report.docx"),
     "sensitivity": ("MODEL", "--of", "nothing"),
+    "linearize": ("MODEL", "--inputs", "nothing"),
 }
 FITTED = ("measured.csv", "--free", "m")
 CANNOT_BE_READ = {  # and with a file that is not there, or is none
@@ -245,6 +246,7 @@ CANNOT_BE_READ = {  # and with a file that is not there, or is none
     "sweep": ("FILE", *VARIED),
     "fit": ("FILE", *FITTED),
     "sensitivity": ("FILE", "--of", "x"),
+    "linearize": ("FILE",),
 }
 
 

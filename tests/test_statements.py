@@ -75,6 +75,24 @@ def test_what_is_known_of_the_hemisphere_holds_of_any_fmu(held):
     assert 0 < checks[0].error < 1e-5
 
 
+def test_a_statement_that_fails_says_whether_a_finer_tolerance_cures_it(held):
+    """Energy is kept to what the tolerance allows: at 1e-5 not to 1e-8, at 1e-7 it is; that the kinetic part
+    is kept is wrong at every tolerance."""
+    claims = """
+        within = 1e-8
+        [[conserved]]
+        of = "energy.total"
+        [[conserved]]
+        of = "energy.kinetic"
+    """
+    energy, kinetic = held(claims, tolerance=1e-5)
+    assert energy.failed
+    assert re.search(r"at a tolerance of 1e-07 it holds \(\S+e-\d+\)$", energy.detail)
+    assert kinetic.failed
+    assert "at a tolerance of 1e-07 it fails too" in kinetic.detail
+    assert all(c.passed for c in held(claims.split('[[conserved]]\n        of = "energy.kin')[0]))
+
+
 @pytest.mark.parametrize(
     ("text", "detail"),
     [

@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+from sympy import symbols
+from sympy.physics.mechanics import dynamicsymbols
 from typer.testing import CliRunner
 
-from lagfmu import Scene, show, verify
+from lagfmu import Model, Parameter, Scene, show, verify
 from lagfmu.bodies import Body, Gravity, Ground, Motor, Revolute, SpringDamper, mechanism
 from lagfmu.errors import LagfmuWarning, ModelError, SettingError
 from lagfmu.testing import app, read_table
@@ -41,6 +43,27 @@ def test_a_pin_wider_than_the_mechanism_is_told():
     """10 mm are 0.01 m."""
     with pytest.warns(LagfmuWarning, match="'A': the radius of its pin is 10 m"):
         swing({"friction": 0.1, "radius": 10})
+
+
+def test_a_parameter_that_stands_nowhere_is_told():
+    """Nothing depends on it, whatever it was meant for; one that only a start or an output needs is used."""
+    x = dynamicsymbols("x")
+    m, k, x0, Re = symbols("m k x0 Re", positive=True)
+    model = Model(
+        name="Spring",
+        lagrangian=m * x.diff() ** 2 / 2 - k * x**2 / 2,
+        coordinates={x: "m"},
+        parameters=[
+            *(Parameter(s, 1.0, u) for s, u in ((m, "kg"), (k, "N/m"), (x0, "m"))),
+            Parameter(Re, 6.378e6, "m"),
+        ],
+        start={x: x0},
+    )
+    with pytest.warns(LagfmuWarning) as told:
+        show(model)
+    assert [str(w.message) for w in told] == [
+        "model 'Spring': parameter 'Re' stands nowhere in the model and changes nothing: leave it out"
+    ]
 
 
 def test_both_stops_of_a_joint_are_not_closed_at_once():

@@ -8,7 +8,6 @@ from importlib.resources import files
 from pathlib import Path
 
 from ..errors import LagfmuError, UsageError
-from .file import READERS
 
 TEMPLATE = '''"""A bead on a parabola z = k x^2.  Change it into your own system, then:
 
@@ -76,6 +75,8 @@ def new(path: Path, source: str | None = None) -> Path:
 
     Raises UsageError if there is a file already, or no such model; LagfmuError if it cannot be written.
     """
+    from .file import READERS  # which imports SymPy, and `lagfmu --help` this
+
     if path.suffix != ".py":
         path = path.with_name(f"{path.name}.py")
     reader = None if source is None else READERS.get(Path(source).suffix.lower())

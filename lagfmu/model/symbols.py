@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
+from dataclasses import fields, is_dataclass
+from typing import Any
 
 import sympy as sp
 from sympy.core.function import AppliedUndef
@@ -14,6 +16,26 @@ def known_symbols(model: ModelFields) -> set[Expr]:
     """Coordinates, speeds, parameters, inputs and time."""
     declared = {p.symbol for p in model.parameters} | {i.symbol for i in model.inputs}
     return {*model.coordinates, *model.speeds, *declared, TIME}
+
+
+def unused(model: ModelFields) -> list[str]:
+    """The parameters that stand nowhere in the model."""
+    told = [getattr(model, f.name) for f in fields(model) if f.name != "parameters"]
+    said = _standing_in([*told, *(p.value for p in model.parameters)])
+    return [name_of(p.symbol) for p in model.parameters if p.symbol not in said]
+
+
+def _standing_in(part: Any) -> set[Expr]:
+    """The free symbols of all expressions in what a model is made of."""
+    if isinstance(part, sp.Basic | sp.MatrixBase):
+        return set(part.free_symbols)
+    if isinstance(part, Mapping):
+        return _standing_in([*part.keys(), *part.values()])
+    if isinstance(part, list | tuple | set | frozenset):
+        return set().union(*map(_standing_in, part))
+    if is_dataclass(part) and not isinstance(part, type):
+        return _standing_in([getattr(part, f.name) for f in fields(part)])
+    return set()
 
 
 def undeclared(

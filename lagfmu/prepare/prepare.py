@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import replace
 
 from ..codegen.py.equations import compile_system, source
 from ..codegen.py.equations import lower as lowered_form
-from ..errors import RequestError
+from ..errors import LagfmuWarning, RequestError
 from ..interface.sensitivities import named
 from ..interface.table import variable_table
 from ..mechanics import fold, prune
@@ -20,6 +21,7 @@ from ..model.elements import Expr
 from ..model.model import Model
 from ..model.scene import Scene
 from ..model.stuck import stuck
+from ..model.symbols import unused
 from .consistency import check_embedding, examined_structure
 from .reduced_start import with_reduced_start
 from .request import formulated
@@ -46,6 +48,11 @@ def derive(request: Request) -> Derived:
     if problems:
         raise RequestError(request.asked.name, problems)
     if known is None or known.model is not model:
+        for name in unused(request.model):
+            text = (
+                f"parameter {name!r} stands nowhere in the model and changes nothing: leave it out"
+            )
+            warnings.warn(f"model {model.name!r}: {text}", LagfmuWarning, stacklevel=4)
         known = with_jumps(derive_equations(model))
     return Derived(model, request.asked, known)
 
