@@ -5,7 +5,8 @@ At rest, v = 0 and q' = 0, the accelerations a of the coordinates z that are lef
     da/dz dz = -a   (least squares; of all dz the least),   q <- s(q + T dz) ,   f(q) = 0 by Gauss and Newton
 
 with contacts and frictions as they stand.  A step is as long as the accelerations go on linearly.  Where a
-has a part that no dz takes away, as at the level of a pendulum's pivot, one step goes where the forces push.
+has a part that no dz takes away, as at the level of a pendulum's pivot, or dz is long and against the forces,
+a step goes where these push: from far away what is found is rather stable, from near what is near.
 """
 
 from __future__ import annotations
@@ -19,12 +20,13 @@ from ...errors import SimulationError
 from .chart import Chart, Rows, chart
 from .exchange import Exchange, Floats
 
-ROUNDS, PUSHES = 100, 12  # of Newton's method; of steps along the forces
+ROUNDS, PUSHES = 100, 20  # of Newton's method; of steps along the forces
 NEARLY, GROWS, SHORTEST = (
     0.5,
     4.0,
     1e-4,
 )  # how linear a step is; how its bound changes; the shortest bound
+PUSHED = 0.2  # part of a coordinate's size, along the forces
 FARTHEST = 0.4  # part of a coordinate's size, at first
 ARRIVED = 1e-13  # likewise
 SETTLED = 1e-6  # likewise: where it no longer gets closer
@@ -46,15 +48,14 @@ def find(ex: Exchange, rows: Rows, inputs: Sequence[str], t: float) -> Chart:
         now = chart(ex, rows, inputs)
         a = now.accelerations(ex)
         dz, unmet = _step(ex, now, a)
-        if unmet:
+        far, push = _far(ex, now, dz), now.along(a)
+        against = far > FARTHEST and _along(ex, now, push, dz) < 0
+        if unmet or (against and pushes < PUSHES):
             pushes, unheld = pushes + 1, unheld or _unheld(ex, now, a)
             if pushes > PUSHES:
                 raise SimulationError(unheld)
-            dz = now.along(a)
-            dz *= FARTHEST / max(_far(ex, now, dz), 1e-300)
-            _move(ex, rows, inputs, now, dz)
+            _move(ex, rows, inputs, now, push * (PUSHED / max(_far(ex, now, push), 1e-300)))
             continue
-        far = _far(ex, now, dz)
         if far <= ARRIVED or (far < SETTLED and far >= last):
             _check_time(ex, t)
             return now
@@ -70,6 +71,13 @@ def _far(ex: Exchange, now: Chart, dz: Floats) -> float:
     """How far that moves any coordinate, in its size."""
     moved = now.T[:, : now.places] @ dz
     return float((np.abs(moved) / ex.size)[ex.coordinate].max(initial=0.0))
+
+
+def _along(ex: Exchange, now: Chart, one: Floats, other: Floats) -> float:
+    """Positive where two displacements go the same way, each coordinate in its size."""
+    place = {n: k for k, n in enumerate(ex.states)}
+    size = np.array([ex.size[place[n]] for n in now.names[: now.places]])
+    return float((one / size) @ (other / size))
 
 
 def _step(ex: Exchange, now: Chart, a: Floats) -> tuple[Floats, bool]:
