@@ -98,6 +98,7 @@ from .studio.live.moving import Moving
 from .studio.live.playable import playable, told_by
 from .studio.live.render import Playable, render
 from .studio.report import pdf as report_pdf
+from .studio.report.findings import obtained
 from .studio.sensitivity.local import sensitivity
 from .studio.sensitivity.ranges import over_ranges
 from .studio.stress import runs, worker

@@ -192,6 +192,17 @@ def test_outliers_weigh_less_under_a_robust_loss(pendulum, swing):
     assert off[1] < 0.1 * off[0]
 
 
+def test_a_robust_loss_estimates_the_deviation_of_the_undisturbed(pendulum):
+    """400 readings with a normal error of 1 mrad, every tenth of which is off by 0.5 rad besides: half of the
+    magnitudes are below 0.674 standard deviations, and the tenth that is far away shifts that to 0.764."""
+    run = lagfmu.simulate(pendulum, stop_time=2, step_size=0.005, start_values=TRUE)
+    data = noisy({n: np.array(run[n]) for n in ("time", "theta")}, 4, theta=1e-3)
+    data["theta"][::10] += 0.5
+    found = lagfmu.fit(pendulum, data, ["L"], loss="cauchy", step_size=0.005)
+    assert found.values["L"] == pytest.approx(0.8, rel=1e-3)
+    assert found.deviations["theta"] == pytest.approx(1e-3 * 0.764 / 0.674, rel=0.1)
+
+
 def test_galileos_ball_was_solid(monkeypatch):
     """The distances of f. 107v, at eight beats of 0.55 s on an incline of 1.70 degrees, as Drake read them:
     kappa = I/(M R^2) of a solid ball is 2/5.  By the line of the documentation, with the FMU's derivative."""

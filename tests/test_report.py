@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 
 import lagfmu
 from lagfmu.errors import BuildError, SimulationError, UsageError
-from lagfmu.testing import app, report_pdf
+from lagfmu.testing import app, obtained, report_pdf
 
 CODE = b"&lt;script&gt;alert(1)&lt;/script&gt;"  # as it stands in XML
 
@@ -88,6 +88,35 @@ def test_what_it_says_of_accuracy_is_the_distance_to_a_closer_run(page, native_f
     assert float(told["lambda.surface"]) == pytest.approx(
         off / np.abs(close["lambda.surface"]).max(), rel=0.1
     )
+
+
+def test_an_impact_that_comes_a_little_later_is_an_error_of_its_time_alone():
+    """A ball that has fallen for 0.5 s, e = 1/2, in two runs whose impacts are 1e-9 s apart, seen at the very
+    instant: there one has v = -g/2 and the other g/4, and beside it they are 1e-9 apart.  A run in which it
+    falls on is wrong by all of v."""
+
+    def ball(impact: float, bounces: bool = True) -> np.ndarray:
+        kinds = [("time", float), ("velocity.y", float), ("closing.floor.count", int)]
+        found = np.zeros(10, [*kinds, ("contact.floor", bool)])
+        found["time"] = np.linspace(0, 0.9, 10)
+        past = (found["time"] >= impact) & bounces
+        found["closing.floor.count"] = past
+        found["velocity.y"] = -9.81 * found["time"] + past * 1.5 * 9.81 * impact
+        return found
+
+    off = obtained(ball(0.5 + 1e-9), ball(0.5))
+    assert off["velocity.y"] == pytest.approx(1.5 * 9.81 * 1e-9 / (9.81 * 0.4), rel=1e-6)
+    assert obtained(ball(0.5, bounces=False), ball(0.5))["velocity.y"] > 1
+
+
+def test_what_the_caller_has_set_is_marked(native_fmu, tmp_path):
+    """A run with m = 2.5 kg: m stands there as set, and nothing else does."""
+    out = tmp_path / "heavy.html"
+    fmu = native_fmu("PendulumAngle")
+    run("report", fmu, "--out", out, "--stop-time", 1, "--set", "m=2.5")
+    rows = table(html.parse(str(out)).getroot(), "Parameters and start values")
+    assert [row[:2] for row in rows if "(set)" in row[1]] == [["m", "2.5 (set)"]]
+    assert ["L", "1"] in [row[:2] for row in rows]
 
 
 def test_it_holds_what_a_colleague_asks_for(page, hemisphere):

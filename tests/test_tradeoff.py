@@ -130,6 +130,20 @@ def test_a_missed_event_is_an_infinite_error(native_fmu):
     assert reference.errors(run)["departure.surface.time"] == float("inf")
 
 
+def test_a_contact_that_closes_a_little_later_is_no_error_but_one_that_stays_open_is(native_fmu):
+    """A ball that has come to rest presses with m g.  At the first point after that a run in which it comes
+    to rest a rounding later has 0; a run that has it at two points is off by the whole weight."""
+    with opened(native_fmu("BouncingBall")) as session:
+        reference = refer(session, communication=0.1)
+        run = observe(session, Setting("dop853", 1e-6, 0.0, 0.1))
+    rests = int(np.flatnonzero(run["contact.floor"])[0])
+    assert run["lambda.floor"][rests] == pytest.approx(9.81)
+    for late, error in ((1, 0.0), (2, 1.0)):
+        run["contact.floor"][rests : rests + late] = False
+        run["lambda.floor"][rests : rests + late] = 0.0
+        assert reference.errors(run)["lambda.floor"] == pytest.approx(error, abs=1e-6)
+
+
 # ------------------------------------------------------------------ measuring
 
 

@@ -165,6 +165,33 @@ def test_links_that_are_fixed_to_another_are_one_body_with_it(tmp_path: Path) ->
     np.testing.assert_allclose(body.inertia, (1, 3, 3, 0, 0, 0))
 
 
+def test_what_is_drawn_stands_where_all_its_origins_put_it(tmp_path: Path) -> None:
+    """A cylinder lies along the z of its own origin: one of 2 m and a quarter of a turn about y reaches from
+    x = 0 to x = 2 about (1, 2, 3).  On a link that is welded on 2 m further on and turned by a quarter about
+    z, a box of (1, 2, 3) m at (1, 0, 0) of it is at (2, 1, 0), its first edge along y."""
+    turned = '<origin xyz="1 2 3" rpy="0 1.5707963267948966 0"/>'
+    wheel = f'<visual>{turned}<geometry><cylinder radius="0.1" length="2"/></geometry></visual>'
+    case = '<visual><origin xyz="1 0 0"/><geometry><box size="1 2 3"/></geometry></visual>'
+    weld = joint("w", "a", "b", "fixed", '<origin xyz="2 0 0" rpy="0 0 1.5707963267948966"/>')
+    links = link("a", MASS + wheel), link("b", MASS + case)
+    (body,) = from_urdf(robot(tmp_path, BASE, *links, HINGE, weld)).bodies
+    rod, box = body.shape
+    np.testing.assert_allclose([rod.start, rod.end], [(0, 2, 3), (2, 2, 3)], atol=1e-15)
+    assert rod.radius == 0.1
+    np.testing.assert_allclose(box.center, (2, 1, 0), atol=1e-15)
+    assert box.size == (1, 2, 3)
+    np.testing.assert_allclose(np.array(box.rotation)[:, 0], (0, 1, 0), atol=1e-15)
+
+
+def test_a_limit_of_0_is_one(tmp_path: Path) -> None:
+    """An elbow bends from -2 rad to 0, a knee from 0, which is left out, to 2; both begin stretched."""
+    elbow = joint("j", "base", "a", "revolute", '<limit lower="-2" upper="0"/>')
+    knee = joint("k", "base", "b", "revolute", '<limit upper="2"/>')
+    parts = from_urdf(robot(tmp_path, BASE, link("a"), link("b"), elbow, knee))
+    assert [j.limits for j in parts.joints] == [(-2.0, 0.0), (0.0, 2.0)]
+    assert parts.start == {"angle.j": 0.0, "angle.k": 0.0}
+
+
 def test_friction_mimic_and_a_start_within_limits(tmp_path: Path) -> None:
     """<dynamics friction> is a torque in N.m, <mimic> a gear; limits without 0 begin in the middle."""
     friction = '<dynamics friction="0.5" damping="1"/><limit lower="0.2" upper="0.6"/>'

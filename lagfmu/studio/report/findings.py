@@ -105,7 +105,7 @@ def obtained(run: Result, closer: Result) -> dict[str, float]:
     """How far each Real of a run is from the closer one, relative to its largest magnitude; points beside
     which modes differ, by the error of an event's time, are left out."""
     known = run.dtype.names or ()
-    modes = [n for n in known if run.dtype[n].kind == "b"]
+    modes = [n for n in known if run.dtype[n].kind == "b"] + names.those(known, *names.COUNTS)
     count = min(len(run), len(closer))
     differ = np.zeros(count, dtype=bool)
     for n in modes:

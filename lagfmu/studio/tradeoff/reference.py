@@ -80,12 +80,12 @@ def refer(
 
 
 def _shared(fine: Trajectory, run: Trajectory) -> tuple[NDArray[Any], NDArray[np.bool_]]:
-    """Rows of `fine` at the times of `run`, and where the contact modes of both are alike, or differ at
-    longer than a single point: that is an error like any other."""
+    """Rows of `fine` at the times of `run`, and where contacts and counts of events of both are alike, or
+    differ at longer than a single point: that is an error like any other."""
     times = fine["time"]
     rows = np.clip(np.searchsorted(times, run["time"]), 1, len(times) - 1)
     rows -= np.abs(times[rows - 1] - run["time"]) < np.abs(times[rows] - run["time"])
     alike = np.ones(len(run), dtype=bool)
-    for name in names.those(run.dtype.names or (), names.CONTACT):
+    for name in names.those(run.dtype.names or (), names.CONTACT, *names.COUNTS):
         alike &= ~alone(run[name] != fine[name][rows])
     return rows, alike
