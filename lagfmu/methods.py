@@ -14,8 +14,10 @@ from dataclasses import dataclass
 class Method:
     """One entry of the menu.
 
-    `made_of` are the integrators behind it where it is not one itself; `remark` is what the description of
-    `solver.method` says of it.
+    `made_of` are the integrators behind it where it is not one itself, the explicit one first; `remark`:
+    what the description of `solver.method` says of it; `differentiated`: a run by it has derivatives;
+    `tangents`: it needs the equations' own; `separable`: it steps equations of position constraints alone,
+    with a constant mass matrix and forces without velocities; `colour`, `marker`: in the figure of a trade-off.
     """
 
     name: str
@@ -24,14 +26,37 @@ class Method:
     fixed_step: bool = False
     native_only: bool = False
     made_of: tuple[str, ...] = ()
+    explicit: bool = False
+    differentiated: bool = False
+    tangents: bool = False
+    separable: bool = False
+    colour: str = ""
+    marker: str = ""
 
 
 MENU = (
     Method("auto", 1, "dop853, but radau5 where it is stiff", made_of=("dop853", "radau5")),
-    Method("dop853", 2),
-    Method("rk4", 3, "fixed step", fixed_step=True, native_only=True),
-    Method("radau5", 4, "stiff"),
-    Method("rattle", 5, "fixed step", fixed_step=True, native_only=True),
+    Method("dop853", 2, explicit=True, differentiated=True, colour="#0b6e99", marker="o"),
+    Method(
+        *("rk4", 3, "fixed step"),
+        fixed_step=True,
+        native_only=True,
+        explicit=True,
+        differentiated=True,
+        colour="#0f7b6c",
+        marker="D",
+    ),
+    Method(
+        *("radau5", 4, "stiff"), differentiated=True, tangents=True, colour="#6940a5", marker="^"
+    ),
+    Method(
+        *("rattle", 5, "fixed step"),
+        fixed_step=True,
+        native_only=True,
+        separable=True,
+        colour="#ad1a72",
+        marker="v",
+    ),
 )
 INSTEAD = {  # SciPy's names, and a method that was offered once -> the one to take
     **dict.fromkeys(("dopri5", "RK23", "RK45", "DOP853"), "dop853"),
@@ -42,6 +67,11 @@ METHODS = tuple(m.name for m in MENU)
 NUMBERS = {m.name: m.number for m in MENU}
 IN_PYTHON = tuple(m.name for m in MENU if not m.native_only)
 INTEGRATORS = tuple(m.name for m in MENU if not m.made_of)
+EXPLICIT = tuple(m.name for m in MENU if m.explicit)
+DIFFERENTIATED = tuple(m.name for m in MENU if m.differentiated)
+SEPARABLE = tuple(m.name for m in MENU if m.separable)
+WITH_TANGENTS = tuple(m.name for m in MENU if m.tangents)
+AUTO, UNLESS_STIFF, STIFF = MENU[0].name, *MENU[0].made_of
 FIXED_STEP = tuple(m.name for m in MENU if m.fixed_step)
 
 

@@ -69,7 +69,7 @@ static void moved(void *context, int j, double given, double used, Priority prio
 }
 
 int bench_start(Bench *b, const double *q, const double *v, double tolerance) {
-    b->solver.settings = (Settings){DOP853, tolerance, 0, 0, 1e6};
+    b->solver.settings = (Settings){AUTO, tolerance, 0, 0, 1e6};
     b->solver.drive.since = 0;
     return solver_start(&b->solver, 0, q, v, b->priority, moved, b);
 }

@@ -175,6 +175,13 @@ def test_preparing_is_a_pipeline() -> None:
         assert "from .prepare import" not in path.read_text(encoding="utf-8"), path.name
 
 
+@pytest.mark.parametrize("method", ["rk4", "rattle"])
+def test_a_method_is_one_file(method: str) -> None:
+    """Its row in methods.py, its file, and the list of all of them for what runs without an FMU: nothing else
+    in lagfmu says its name."""
+    assert HOUSE["places"](ROOT, method) == 3
+
+
 def test_the_solver_is_no_store_of_scratch() -> None:
     """What a part of the simulation needs for itself it keeps in memory that is laid out in its own files."""
     assert HOUSE["members"](ROOT / "runtime" / "simulation" / "solver.h") <= 30

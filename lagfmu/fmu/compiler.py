@@ -25,6 +25,7 @@ from functools import cache, lru_cache
 from pathlib import Path
 
 from ..errors import BuildError, TemporaryFolderError, UsageError
+from ..methods import INTEGRATORS
 from .bundle import reached
 
 HOST, ALL = "host", "all"
@@ -52,7 +53,8 @@ HOT = {  # where the time of a step and of a communication point goes; all else 
     *("model.c", "mechanism.c", "project.c", "sliding.c", "sensitivity.c"),
     *("sliding_along.c", "variation.c", "derivatives.c"),
     *("linear.c", "schur.c", "ldlt.c", "lu.c", "painleve.c"),
-    *("dop853.c", "rk4.c", "radau5.c", "rattle.c", "integrator.c"),
+    *(f"{method}.c" for method in INTEGRATORS),
+    "integrator.c",
     *("segment.c", "state.c", "observe.c", "minimum_gap.c", "system.c"),
 }
 

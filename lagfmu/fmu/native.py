@@ -12,6 +12,7 @@ from ..codegen.c.optional import held, needs_tangents, optional_source
 from ..codegen.c.tables import entanglements
 from ..codegen.c.variables import variables_source
 from ..errors import BuildError
+from ..methods import SEPARABLE
 from ..prepare.prepare import Prepared
 from .archive import pack, tool
 from .bundle import BUNDLE, bundled, linked, reached
@@ -121,11 +122,11 @@ def sources_of(prepared: Prepared, listed: bool = True, face: Face = USUAL) -> S
     """
     form, scene = prepared.coded, prepared.scene
     table, system = prepared.table, prepared.system
-    problems = entanglements(form.equations, form.formulation) if scene.method == "rattle" else []
+    problems = entanglements(form.equations, form.formulation) if scene.method in SEPARABLE else []
     if problems:
         raise BuildError(
-            f"scene {scene.name!r}: rattle cannot step these equations: {'; '.join(problems)}; choose "
-            "another method"
+            f"scene {scene.name!r}: {scene.method} cannot step these equations: {'; '.join(problems)}; "
+            "choose another method"
         )
     everything = {f: text for f, text in runtime_files().items() if face.holds(f)}
     integrators = held(scene, form)
@@ -135,7 +136,7 @@ def sources_of(prepared: Prepared, listed: bool = True, face: Face = USUAL) -> S
     generated = {
         "model.c": model.encode(),
         "variables.c": variables_source(table, form, scene, system).encode(),
-        OPTIONAL: optional_source(scene, system, integrators, measured, joints).encode(),
+        OPTIONAL: optional_source(scene, system, form, integrators, measured, joints).encode(),
     }
     if face.fmi == 3:
         inside = arrays(table)

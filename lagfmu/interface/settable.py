@@ -42,7 +42,7 @@ def solver_settings(scene: Scene) -> list[Variable]:
     methods = tuple(scene.selectable)
     text = described(methods)
     choice = setting(names.METHOD, text, scene.method, kind="Enumeration", items=methods)
-    text = "largest fixed step of rk4; 0: chosen from the start"
+    text = f"largest fixed step of {' and '.join(FIXED_STEP)}; 0: chosen from the start"
     step = setting(names.STEP, text, scene.step, unit=SECOND, minimum=0.0)
     text = (
         f"relative tolerance of each step; 0: the one of the experiment, else {scene.tolerance!r}"

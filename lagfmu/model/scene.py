@@ -11,15 +11,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from ..errors import RequestError
-from ..methods import METHODS, integrators, unknown
+from ..methods import AUTO, DIFFERENTIATED, EXPLICIT, METHODS, UNLESS_STIFF, integrators, unknown
 from ..numeric.tolerance import DEFAULT_TOLERANCE, tolerance_problem
 from .elements import NAME, is_number
 
 FORMULATIONS = ("multipliers", "nullspace", "minimal")
 EVERYTHING = ("*",)
 LONGEST = 200  # letters of a name: a file's may have 255, with what stands before and after
-EXPLICIT = ("dop853", "rk4")  # methods whose steps are differentiated, and with them ...
-VARIED = (*EXPLICIT, "radau5")  # ... what has to be asked for
 
 
 @dataclass(frozen=True)
@@ -137,14 +135,14 @@ class Scene:
             for text in self.sensitivities
             if not all(text.partition(":")[::2])
         ]
-        if self.method == "auto":
-            object.__setattr__(self, "method", "dop853")
-        chosen = [self.method, *(m for m in self.methods or () if m != "auto")]
+        if self.method == AUTO:
+            object.__setattr__(self, "method", UNLESS_STIFF)
+        chosen = [self.method, *(m for m in self.methods or () if m != AUTO)]
         problems += [
-            f"sensitivities with the method {m!r}: expected {' or '.join(VARIED)}, whose steps are "
+            f"sensitivities with the method {m!r}: expected {' or '.join(DIFFERENTIATED)}, whose steps are "
             "differentiated"
             for m in chosen
-            if m not in VARIED
+            if m not in DIFFERENTIATED
         ]
         object.__setattr__(self, "methods", tuple(chosen) if self.methods else None)
         return problems
@@ -176,7 +174,9 @@ class Scene:
         if self.methods is not None:
             return tuple(self.methods)
         if self.sensitivities:
-            return tuple(m for m in VARIED if m == self.method or (self.complete and m in EXPLICIT))
+            return tuple(
+                m for m in DIFFERENTIATED if m == self.method or (self.complete and m in EXPLICIT)
+            )
         return METHODS if self.complete else (self.method,)
 
     @property

@@ -17,6 +17,7 @@ from ..mechanics.equations import EquationsOfMotion
 from ..mechanics.form import Form
 from ..mechanics.formulations import minimal
 from ..mechanics.jumps import with_jumps
+from ..methods import AUTO, UNLESS_STIFF
 from ..model.elements import Expr
 from ..model.model import Model
 from ..model.scene import Scene
@@ -84,8 +85,8 @@ def reduce(narrowed: Narrowed) -> Reduced:
         idle = [p for p in fold.idle(_with_numbers(coded, fixed)) if str(p) not in asked]
         fixed |= fold.values(idle, narrowed.model)
         damped = fold.damped(coded.equations, fixed)
-        if scene.method == "auto" and scene.methods is None and not damped:
-            scene = replace(scene, method="dop853")
+        if scene.method == AUTO and scene.methods is None and not damped:
+            scene = replace(scene, method=UNLESS_STIFF)
         whole = variable_table(form, scene)
     check_embedding(form)
     coded = fold.folded_form(coded, fixed)

@@ -264,7 +264,7 @@ def _quoted(items: Sequence[Any]) -> list[str]:
 
 
 def entanglements(eom: EquationsOfMotion, formulation: str) -> list[str]:
-    """Why the method rattle cannot step these equations; nothing if it can.
+    """Why a method of separable equations cannot step these; nothing if it can.
 
     It needs M of parameters, forces without velocities, position constraints that no input moves, and
     the formulation 'multipliers'.

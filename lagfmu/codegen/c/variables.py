@@ -13,6 +13,7 @@ from ...interface.rules import CALCULATED
 from ...interface.variables import Variable, VariableTable
 from ...mechanics.form import Form
 from ...mechanics.joint_coordinates import start_names
+from ...methods import NUMBERS
 from ...model.scene import Scene
 from ...numeric.system import NONHOLONOMIC, System
 from .printer import string
@@ -95,7 +96,7 @@ def variables_source(table: VariableTable, form: Form, scene: Scene, system: Sys
         count=len(rows),
         identifier=string(scene.name),
         tolerance=repr(float(scene.tolerance)),
-        method=scene.method.upper(),
+        method=NUMBERS[scene.method],
         lost=int(names.DISSIPATED in table.states),
         motions="&MOTIONS" if system.prescribed else "NULL",
         multipliers="&MULTIPLIERS_GIVEN" if table.those(names.RESIDUAL_RATE) else "NULL",
@@ -215,7 +216,7 @@ def _motion(system: System, rates: tuple[str, str, str]) -> dict[str, Place]:
 
 def _row(v: Variable, place: Place, states: dict[str, int]) -> str:
     where, index, contact = place
-    start = v.start.upper() if isinstance(v.start, str) else repr(float(v.start or 0.0))
+    start = NUMBERS[v.start] if isinstance(v.start, str) else repr(float(v.start or 0.0))
     low = "-HUGE_VAL" if v.minimum is None else repr(float(v.minimum))
     high = "HUGE_VAL" if v.maximum is None else repr(float(v.maximum))
     fields = [
@@ -226,7 +227,7 @@ def _row(v: Variable, place: Place, states: dict[str, int]) -> str:
         str(index),
         str(contact),
         str(states[v.name] if v.role == "start" else NONE),
-        start,
+        str(start),
         low,
         high,
         str(int(v.positive)),

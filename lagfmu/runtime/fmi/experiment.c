@@ -39,17 +39,17 @@ static int is_same(const Instance *x, const Variable *v, double value) {
 
 static Status method_exists(Why *why, const Variable *v, double value) {
     const char *comma = "";
-    const int method = value >= 0 && value < METHOD_COUNT ? (int)value : 0;
-    if (method == RATTLE && !(MODEL_SYSTEM->separable && MODEL_SYSTEM->formulation == MULTIPLIERS))
+    const int method = value >= 0 && value < METHODS_MOST ? (int)value : 0;
+    if (method > 0 && method == OPTIONAL.unfit)
         return fail(why,
-                    "'%s' = 'rattle': this method needs a constant mass matrix, forces without velocities, "
+                    "'%s' = '%s': this method needs a constant mass matrix, forces without velocities, "
                     "position constraints only and the formulation 'multipliers'; choose another",
-                    v->name);
-    if (method > 0 && method < METHOD_COUNT && OPTIONAL.methods[method] != NULL) return OK;
+                    v->name, OPTIONAL.names[method]);
+    if (method > 0 && OPTIONAL.methods[method] != NULL) return OK;
     (void)fail(why, "'%s' = %.0f, expected one of ", v->name, value);
-    for (int k = 1; k < METHOD_COUNT; k++) {
+    for (int k = 1; k < METHODS_MOST; k++) {
         if (OPTIONAL.methods[k] == NULL) continue;
-        why_append(why, "%s%d (%s)", comma, k, METHOD_NAMES[k]);
+        why_append(why, "%s%d (%s)", comma, k, OPTIONAL.names[k]);
         comma = ", ";
     }
     return FAILED;

@@ -73,7 +73,7 @@ void instance_reset(Instance *x) {
     x->start_time = 0;
     x->solver.stop_time = HUGE_VAL;
     x->tolerance = 0;
-    x->given.method = (MethodName)DEFAULT_METHOD;
+    x->given.method = DEFAULT_METHOD;
     x->solver.on_demand = 1;
     x->started = x->running = x->warned = x->held = x->weighed = x->moved = x->ticking = 0;
     x->version += 1;

@@ -95,7 +95,7 @@ void instance_set(Instance *x, const Variable *v, double value) {
     }
     switch (v->place) {
         case AT_PARAMETER: x->solver.p[v->index] = value; break;
-        case AT_METHOD: x->given.method = (MethodName)value; break;
+        case AT_METHOD: x->given.method = (int)value; break;
         case AT_TOLERANCE: x->given.tolerance = value; break;
         case AT_STEP: x->given.step = value; break;
         case AT_MAXIMUM_STEP: x->given.maximum_step = value; break;

@@ -28,8 +28,8 @@ Status restored_none(Instance *x, const char *name, double value) {
 }
 
 /* The methods that this FMU holds; before the start none may be chosen yet. */
-static int offered(MethodName method) {
-    return (int)method > 0 && (int)method < METHOD_COUNT && OPTIONAL.methods[method] != NULL;
+static int offered(int method) {
+    return method > 0 && method < METHODS_MOST && OPTIONAL.methods[method] != NULL;
 }
 
 /* `many` numbers of the kind `size` bytes of each say, by themselves. */
@@ -72,7 +72,8 @@ static Status each_of_solver(Instance *x, const Solver *solver) {
     const State *a = &solver->state;
     const Numbers *of = &a->now;
     const Integrator *i = &solver->integrator;
-    const Method *now = x->started ? OPTIONAL.methods[of->choice.implicit ? RADAU5 : solver->settings.method] : NULL;
+    const Method *const chosen = x->started ? OPTIONAL.methods[solver->settings.method] : NULL;
+    const Method *now = x->started && of->choice.implicit ? OPTIONAL.implicit : chosen;
     const int width = solver_width(solver);
     if (each_of_choice(x, &of->choice) != OK || each_of_approach(x, &of->approach) != OK) return FAILED;
     STATE_NUMBERS(SOUND_NUMBER)
@@ -132,7 +133,7 @@ static Status together(Instance *x) {
 static Status together_in_solver(Instance *x, const Solver *s) {
     const Numbers *now = &s->state.now;
     const Choice *c = &now->choice;
-    if ((c->implicit || c->turn) && (s->settings.method != AUTO || OPTIONAL.methods[RADAU5] == NULL))
+    if ((c->implicit || c->turn) && (s->settings.method != AUTO || OPTIONAL.implicit == NULL))
         return restored_none(x, "stiffness mode", c->implicit);
     if (c->failures > STIFFNESS_MOST_FAILURES || c->retries > STIFFNESS_MOST_RETRIES)
         return restored_none(x, "stiffness memory", c->failures + c->retries);

@@ -71,7 +71,7 @@ typedef struct Variable {
     Place place;
     int index, contact;
     int state;       /* role START: its number among start values (system_starts()); -1 */
-    double start;    /* of what can be set; of AT_METHOD a MethodName */
+    double start;    /* of what can be set; of AT_METHOD its number */
     double min, max; /* -HUGE_VAL, HUGE_VAL where there is none */
     int positive;    /* zero is refused */
     int given;       /* role START: the model's `start` says it; otherwise nobody did, and it is 0 */
@@ -95,7 +95,7 @@ SHARED const Derivatives *const DERIVATIVES; /* &OF_RUN (derivatives.h), or NULL
 SHARED const System *const MODEL_SYSTEM;       /* the system that is stepped */
 SHARED const char *const MODEL_IDENTIFIER, *const MODEL_GUID;
 SHARED const double DEFAULT_TOLERANCE;
-SHARED const int DEFAULT_METHOD;               /* MethodName */
+SHARED const int DEFAULT_METHOD;               /* its number */
 SHARED const int EXCHANGE_LOST;                /* 1: the energy dissipated is the last continuous state */
 
 /* j of y = (q, v) of the stepped system; -1 of what is no state. */

@@ -71,6 +71,14 @@ struct Mechanism {
 SHARED void mechanism_layout(Mechanism *b, Arena *arena, const System *s, Why *why,
                              const Sliding *sliding);
 
+/* What a method needs that steps the mechanism itself: the rows that act, on f = offset (m; NULL: on f = 0); inputs, held
+ * during the step, and parameters. */
+typedef struct {
+    Mechanism *b;
+    const int *active;
+    const double *offset, *u, *p;
+} Acting;
+
 /* sum_j G_kj x_j for the row k of the G that was evaluated last. */
 static inline double mechanism_row(const Mechanism *b, int k, const double *x) {
     const System *s = b->system;

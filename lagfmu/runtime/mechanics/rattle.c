@@ -9,7 +9,7 @@
  *
  * lambda: simplified Newton with the factors at q, until what is left is rounding.  Dense output:
  * the quintic Hermite polynomial of q (from q, v, a at both ends), and its derivative for v. */
-#include "rattle.h"
+#include "mechanism.h"
 
 #include "step_size.h"
 
@@ -101,16 +101,17 @@ static Status composed_step(Mechanism *b, Instant at, double t_new, double h, co
     return OK;
 }
 
-Status rattle_step(Integrator *i, Mechanism *b, const int *active, const double *offset,
-                   const double *u, const double *p, const Control *control, double t_bound) {
+static Status rattle_step(Integrator *i, const Ode *ode, const Control *control, double t_bound) {
+    const Acting *of = ode->mechanism;
+    Mechanism *b = of->b;
     const int ny = i->ny;
     const Fixed fixed = step_size_fixed(i->t, t_bound, control->fixed_step);
     double *y = i->scratch, *step = y + ny;
     if (!(fabs(fixed.h) > 0))
         return step_size_stop(b->why, i->t, "no step leads to the bound", 0);
     memcpy(y, i->y, (size_t)ny * sizeof *y);
-    const Instant start = {i->t, u, p};
-    if (composed_step(b, start, fixed.t_new, fixed.h, active, offset, y, step) != OK)
+    const Instant start = {i->t, of->u, of->p};
+    if (composed_step(b, start, fixed.t_new, fixed.h, of->active, of->offset, y, step) != OK)
         return step_size_stop(b->why, i->t, "a stage of rattle fails", 1);
     if (!step_size_finite(ny, y))
         return step_size_stop(b->why, i->t, "the state is not finite", 0);
@@ -161,6 +162,9 @@ SHARED_VALUE const Method rattle = {
     .dense_arrays = 2,
     .scratch_arrays = 2, /* y, q1 - q */
     .fixed = 1,
+    .fewest_steps = 8,
+    .of_mechanism = 1,
+    .step = rattle_step,
     .prepare_dense = rattle_prepare,
     .dense = rattle_dense,
 };

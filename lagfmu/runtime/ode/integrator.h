@@ -1,7 +1,7 @@
 /* integrator.h -- y' = f(t, y): one step of any method, and dense output over the step just taken.
  *
- * Each method is a file with its tableau's source: dop853.c, rk4.c, radau5.c (rattle.c
- * steps a mechanical system, not an ODE, and fills the same Integrator).  Error weights: an
+ * Each method is a file with its tableau's source, which defines a Method (one
+ * that steps a mechanical system, not an ODE, fills the same Integrator).  Error weights: an
  * accepted step has a root-mean-square error below 1 in units of tolerance * max(|y_i|, scale_i);
  * radau5's estimate is of low order: it is kept below 0.1 tolerance^(2/3), so that the error is. */
 #ifndef LAGFMU_INTEGRATOR_H
@@ -19,13 +19,14 @@ typedef struct {
      * others, if there are any, are blocks of n with x' = J x + ... of their own. */
     Status (*jacobian)(void *context, double t, const double *y, double *J, double *dfdt);
     Why *why;
+    const void *mechanism; /* of a method that steps one itself: an Acting (mechanism.h) */
 } Ode;
 
 typedef struct {
     double tolerance;      /* relative, per step */
     const double *scale;   /* (watched) magnitudes below which errors are measured absolutely */
     double maximum_step;   /* [s]; 0: no limit */
-    double fixed_step;     /* [s]; of rk4 and rattle */
+    double fixed_step;     /* [s]; of methods with one */
 } Control;
 
 typedef struct Method Method;
@@ -56,11 +57,13 @@ struct Method {
     int last_stage; /* arrays in `dense` before two of a stage at t, its argument and its rate, which
                      * stay as they are; 0: they are not kept */
     int coarse;                       /* dense() has fewer digits than the step: to search by, not to be read */
-    int fixed;                        /* a fixed step that divides the way to t_bound evenly */
+    int fixed;                        /* a fixed step that divides the way to t_bound evenly, ... */
+    double fewest_steps;              /* ... so many in one natural time of the motion unless solver.step is set */
+    int of_mechanism;                 /* 1: it steps ode->mechanism, whose rows stay as they are */
     /* One accepted step from integrator->t towards t_bound, never past it.  On success t_old,
      * y_old, f_old, t, y, h_next are new, and dense() answers in [t_old, t]; the dense data may be
      * completed lazily by `prepare_dense`.  FAILED (step size underflow, not finite): as before the
-     * call, but that f may be known now.  NULL for rattle: rattle_step() stands in for it. */
+     * call, but that f may be known now. */
     Status (*step)(Integrator *i, const Ode *ode, const Control *control, double t_bound);
     /* Evaluates what dense() needs beyond the step itself; called at most once a step.  To be
      * called before y is changed by a projection, after which dense() answers as before.  NULL:
@@ -69,14 +72,11 @@ struct Method {
     void (*dense)(const Integrator *i, double t, double *y);
     /* The largest error of dense() within the step, in units of the tolerance; after prepare_dense.  NULL: not known. */
     Status (*dense_error)(Integrator *i, const Ode *ode, const Control *control, double *error);
+    /* Estimate of the error of one component in the step just taken, of a method that controls none.  NULL: not known. */
+    double (*error)(const Integrator *i, int component);
 };
 
 enum { RADAU5_MOST_STATES = 800 }; /* for which radau5 keeps dense matrices */
-
-SHARED const Method dop853, rk4, radau5;
-
-/* rk4: estimate of the error of one component in the step just taken. */
-SHARED double rk4_error(const Integrator *i, int component);
 
 /* Takes memory for any of `count` methods (NULL: none) from the arena.  The arrays that must be saved (y, f, y_old,
  * f_old, dense) come from `saved`, the scratch from `scratch`. */

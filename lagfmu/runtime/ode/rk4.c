@@ -55,7 +55,7 @@ static Status rk4_step(Integrator *i, const Ode *ode, const Control *control, do
     return OK;
 }
 
-double rk4_error(const Integrator *i, int component) {
+static double rk4_error(const Integrator *i, int component) {
     return i->dense[ERROR * i->ny + component];
 }
 
@@ -74,6 +74,8 @@ SHARED_VALUE const Method rk4 = {
     .dense_arrays = ROWS_KEPT,
     .scratch_arrays = 5, /* k2, k3, k4, f1, y1 */
     .fixed = 1,
+    .fewest_steps = 100,
     .step = rk4_step,
     .dense = rk4_dense,
+    .error = rk4_error,
 };

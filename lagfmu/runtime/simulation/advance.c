@@ -41,7 +41,7 @@ void advance_layout(Solver *s, Arena *scratch) {
 }
 
 static const Method *method_of(const Solver *s) {
-    return OPTIONAL.methods[s->state.now.choice.implicit ? RADAU5 : s->settings.method];
+    return s->state.now.choice.implicit ? OPTIONAL.implicit : OPTIONAL.methods[s->settings.method];
 }
 
 /* May the integrator stand ahead of the communication point?  Not with inputs, which may change; not

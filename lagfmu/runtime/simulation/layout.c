@@ -27,7 +27,7 @@ static void state_layout(Solver *solver, Arena *saved, Arena *scratch) {
         x->latest[k].v = arena_doubles(saved, count * nv);
     }
     STATE_ARRAYS_BEHIND(TAKE)
-    integrator_layout(i, saved, scratch, solver_width(solver), nq + nv, OPTIONAL.methods, METHOD_COUNT);
+    integrator_layout(i, saved, scratch, solver_width(solver), nq + nv, OPTIONAL.methods, METHODS_MOST);
     x->block_size = saved->used - begin;
 }
 
@@ -57,7 +57,7 @@ void solver_layout(Solver *s, Arena *saved, Arena *scratch, const System *system
     s->drive.second = arena_doubles(saved, system->inputs);
     s->p = arena_doubles(saved, system->parameters);
     Arena none = {NULL, 0}; /* the two never step within each other */
-    integrator_layout(&s->probe, scratch, &none, solver_width(s), states, OPTIONAL.methods, METHOD_COUNT);
+    integrator_layout(&s->probe, scratch, &none, solver_width(s), states, OPTIONAL.methods, METHODS_MOST);
     s->probe.scratch = s->integrator.scratch;
     s->probe.pivots = s->integrator.pivots;
     mechanism_layout(&s->stepped, scratch, system, &s->why,

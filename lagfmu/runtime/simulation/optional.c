@@ -3,14 +3,11 @@
 
 #include "feature.h"
 
+SHARED const Method dop853, rk4, radau5, rattle;
+
 SHARED_VALUE const Optional OPTIONAL = {
-    .methods = {[AUTO] = &dop853,
-                [DOP853] = &dop853,
-                [RK4] = &rk4,
-                [RATTLE] = &rattle,
-                [RADAU5] = &radau5},
-    .rk4_error = rk4_error,
-    .rattle_step = rattle_step,
+    .methods = {NULL, &dop853, &dop853, &rk4, &radau5, &rattle}, /* in the order of lagfmu/methods.py */
+    .implicit = &radau5,
     .events = &EVENTS,
     .contacts = &CONTACTS,
     .switches = &SWITCHES,

@@ -13,18 +13,16 @@
 #include "switches.h"
 #include "linkage.h"
 #include "passage.h"
-#include "rattle.h"
 #include "friction_events.h"
 #include "modes.h"
 #include "variation.h"
 
 typedef struct {
-    /* Integrators by MethodName, that of AUTO being the explicit one; NULL where it is left out. */
-    const Method *methods[METHOD_COUNT];
-    double (*rk4_error)(const Integrator *i, int component);
-    Status (*rattle_step)(Integrator *i, Mechanism *b, const int *active, const double *offset,
-                          const double *u, const double *p, const Control *control,
-                          double t_bound);
+    /* Integrators by their numbers, that of AUTO being the explicit one, NULL where it is left out; its implicit one; the
+     * number of a method that cannot step these equations, 0: of none; names, of those too that are left out. */
+    const Method *methods[METHODS_MOST], *implicit;
+    int unfit;
+    const char *names[METHODS_MOST];
     /* Finds events; NULL where there is nothing to watch. */
     const Events *events;
     /* What happens at contacts; NULL where there are none, and no frictions. */

@@ -11,8 +11,6 @@
 #include "sensitivity.h"
 #include "step_size.h"
 
-static const double FEWEST_STEPS_RK4 = 100; /* in one natural time of the motion, ... */
-static const double FEWEST_STEPS_RATTLE = 8; /* ... unless solver.step is set */
 static const double FAR = 1e3, LEAST_FAR = 1e-6; /* how far a projection may move the state: times the
                                                   * tolerance, and at least, relative to the state */
 static const double BALANCED = 1e3 * DBL_EPSILON; /* of what the forces alone would make of a step: what they
@@ -114,11 +112,11 @@ static Status jacobian(void *context, double t, const double *y, double *J, doub
 static Ode equations_at(Solver *s, double t) {
     const int plain = is_plain(s) && !s->state.now.approach.near;
     if (plain) (void)segment_instant(s, t); /* switch states, which stay */
-    return (Ode){s, plain ? plain_rate : rate_of_state, jacobian, &s->why};
+    return (Ode){s, plain ? plain_rate : rate_of_state, jacobian, &s->why, NULL};
 }
 
 double segment_fewest_steps(const Solver *s) {
-    return s->settings.method == RATTLE ? FEWEST_STEPS_RATTLE : FEWEST_STEPS_RK4;
+    return OPTIONAL.methods[s->settings.method]->fewest_steps;
 }
 
 double segment_natural_step(const Solver *s) {
@@ -140,15 +138,15 @@ static Control control(const Solver *s, const Integrator *i, double longest) {
                      fixed};
 }
 
-/* rk4 controls no error; a step whose error is as large as the state itself is refused. */
+/* Of a method that controls no error a step whose error is as large as the state itself is refused. */
 static Status check_fixed_step(Solver *s, const Integrator *i) {
     for (int j = 0; j < system_states(s->system); j++) {
         const double size = nominals_natural(s, j);
-        if (!(fabs(OPTIONAL.rk4_error(i, j)) <= HOPELESS * fmax(fabs(i->y[j]), size)))
+        if (!(fabs(i->method->error(i, j)) <= HOPELESS * fmax(fabs(i->y[j]), size)))
             return fail(&s->why,
-                        "the integration stops at t = %.17g s, rk4's step of %.3g s is far too "
+                        "the integration stops at t = %.17g s, %s's step of %.3g s is far too "
                         "large: reduce solver.step",
-                        i->t_old, i->t - i->t_old);
+                        i->t_old, i->method->name, i->t - i->t_old);
     }
     return OK;
 }
@@ -175,17 +173,17 @@ static Status accept(Solver *s, Integrator *i) {
 
 Status segment_step(Solver *s, Integrator *i, double t_bound, double longest) {
     s->stages.narrowest = s->stages.apart = 1;
-    if (s->settings.method != RATTLE && accept(s, i) != OK) return FAILED;
+    if (!i->method->of_mechanism && accept(s, i) != OK) return FAILED;
     const Control c = control(s, i, longest);
-    if (s->settings.method == RATTLE) {
+    if (i->method->of_mechanism) {
         const Instant at = segment_instant(s, i->t);
-        return OPTIONAL.rattle_step(i, &s->stepped, s->active, s->state.offset, at.u, at.p, &c,
-                                 t_bound);
+        const Acting acting = {&s->stepped, s->active, s->state.offset, at.u, at.p};
+        return i->method->step(i, &(Ode){.mechanism = &acting}, &c, t_bound);
     }
     const Ode ode = equations_at(s, i->t);
     if (i->method->step(i, &ode, &c, t_bound) != OK) return FAILED;
     if (s->columns > 0) OPTIONAL.variation->stepped(s, i);
-    return s->settings.method == RK4 ? check_fixed_step(s, i) : OK;
+    return i->method->error != NULL ? check_fixed_step(s, i) : OK;
 }
 
 Status segment_rate(Solver *s, Integrator *i) {

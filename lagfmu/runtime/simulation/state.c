@@ -1,4 +1,4 @@
-/* state.c -- names of the methods, and inputs as polynomials in the time since they were set:
+/* state.c -- inputs as polynomials in the time since they were set:
  *
  *   u_k(e) = value_k + e (first_k + e second_k / 2) ,   e = t - since
  *
@@ -7,9 +7,6 @@
 #include "state.h"
 
 #include <string.h>
-
-SHARED_VALUE const char *const METHOD_NAMES[METHOD_COUNT] = {
-    [AUTO] = "auto", [DOP853] = "dop853", [RK4] = "rk4", [RADAU5] = "radau5", [RATTLE] = "rattle"};
 
 void drive_at(const System *s, const Drive *drive, double t, double *u) {
     const double e = t - drive->since, *value = drive->value;

@@ -10,10 +10,9 @@
 #include "stiffness.h"
 #include "system.h"
 
-/* The numbers that an importer sees; they never change (lagfmu/methods.py).  METHOD_NAMES[0] is NULL. */
-typedef enum { AUTO = 1, DOP853 = 2, RK4 = 3, RADAU5 = 4, RATTLE = 5 } MethodName;
-enum { METHOD_COUNT = 6 };
-SHARED const char *const METHOD_NAMES[METHOD_COUNT];
+/* Methods have the numbers that an importer sees (lagfmu/methods.py).  That of `auto`, which turns from one to another, and
+ * one more than any. */
+enum { AUTO = 1, METHODS_MOST = 16 };
 
 /* How to step.  tolerance: relative, a step; step [s]: largest step of rk4 and rattle, 0: chosen;
  * maximum_step [s]: largest adaptive step, 0: no limit.  maximum_steps: how many steps shorter than 1e-6
@@ -24,7 +23,7 @@ SHARED const char *const METHOD_NAMES[METHOD_COUNT];
     N(double, maximum_step, SIZE, "solver.maximum_step") \
     N(double, maximum_steps, SIZE, "solver.maximum_steps")
 typedef struct {
-    MethodName method;
+    int method;
     SETTINGS_NUMBERS(SAVED_MEMBER)
 } Settings;
 

@@ -12,11 +12,12 @@ from typing import Any
 
 import numpy as np
 
+from ...methods import MENU
 from .measure import Point, Tradeoff
 from .quantities import MULTIPLIER
 
-COLOURS = {"dop853": "#0b6e99", "radau5": "#6940a5", "rk4": "#0f7b6c", "rattle": "#ad1a72"}
-MARKERS = {"dop853": "o", "radau5": "^", "rk4": "D", "rattle": "v"}
+COLOURS = {m.name: m.colour for m in MENU if m.colour}
+MARKERS = {m.name: m.marker for m in MENU if m.marker}
 WORTH = 0.1  # part of the error of the last named point at which the next one is named
 
 
