@@ -17,7 +17,7 @@ class Method:
     `made_of` are the integrators behind it where it is not one itself, the explicit one first; `remark`:
     what the description of `solver.method` says of it; `differentiated`: a run by it has derivatives;
     `tangents`: it needs the equations' own; `separable`: it steps equations of position constraints alone,
-    with a constant mass matrix and forces without velocities; `colour`, `marker`: in the figure of a trade-off.
+    with a constant mass matrix and forces without velocities; `colour`, `marker`: in a figure.
     """
 
     name: str

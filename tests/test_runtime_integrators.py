@@ -97,13 +97,14 @@ static Status jacobian(void *context, double t, const double *y, double *J, doub
     return OK;
 }
 
+SHARED const Method dop853, rk4, radau5;
 static const Method *const METHODS[] = {&dop853, &rk4, &radau5};
 
 Run *run_new(int method, int problem, int ny, const double *y, double t, double h) {
     Run *r = calloc(1, sizeof *r);
     r->problem = problem;
     r->fails_after = HUGE_VAL;
-    r->ode = (Ode){r, rate, jacobian, &r->why};
+    r->ode = (Ode){r, rate, jacobian, &r->why, NULL};
     for (int k = 0; k < 8; k++) r->scale[k] = 1;
     r->control = (Control){1e-8, r->scale, 0, 0.1};
     integrator_layout(&r->i, &r->saved, &r->scratch, ny, ny, METHODS, 3);
