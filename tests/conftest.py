@@ -93,6 +93,7 @@ EVERY = {  # what is tried of every FMU of models/: that its page is the native 
     "RoughHemisphere": "rough_hemisphere",
     "Arm": "arm",
     "Bennett": "bennett",
+    "Cat": "cat",
     "Door": "door",
     "DoubleWishbone": "double_wishbone",
     "Gyroscope": "gyroscope",
