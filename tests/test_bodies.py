@@ -232,6 +232,33 @@ def test_a_gear_divides_a_torque():
     assert run["motor.power"] == pytest.approx(1.4 * run["der(angle.A)"], rel=1e-14)
 
 
+def test_a_cam_turns_work_into_the_motion_of_both_wheels():
+    """angle.A = 0.5 B + 0.3 B^2 - 0.1 B^3 with s its slope: (J2 + s^2 J1) B'^2/2 = tau B from rest, and the
+    wheel A receives J1 (s B'' + s' B')."""
+    one, two = Body("one", 1.0, 0.5), Body("two", 1.0, 2.0)
+    run = moved(
+        plane(
+            bodies=[one, two],
+            joints=[
+                Gear("cam", "A", "B", ratio=0.5, higher=[0.3, -0.1]),
+                Revolute("A", ground.at((0, 0)), one.at((0, 0))),
+                Revolute("B", ground.at((1, 0)), two.at((0, 0))),
+            ],
+            loads=[Motor("motor", "B", torque=1.4)],
+            start={"angle.B": 0.0},
+        ),
+        stop=4.0,
+    )
+    B, rate, second = (run[n] for n in ("angle.B", "der(angle.B)", "der(angle.B,2)"))
+    slope, bend = 0.5 + 0.6 * B - 0.3 * B**2, (0.6 - 0.6 * B) * rate
+    assert run["angle.A"] == pytest.approx(0.5 * B + 0.3 * B**2 - 0.1 * B**3, rel=1e-10, abs=1e-12)
+    assert (2.0 + slope**2 * 0.5) * rate**2 / 2 == pytest.approx(1.4 * B, rel=1e-8, abs=1e-10)
+    torque = 0.5 * (slope * second + bend * rate)
+    largest = abs(torque).max()
+    assert run["lambda.cam"] == pytest.approx(torque, rel=1e-8, abs=1e-9 * largest)
+    assert B[-1] > 2
+
+
 def test_a_motor_that_prescribes_an_angle_supplies_the_torque_for_it():
     """phi = 0.3 sin(5 t): tau = J phi'' on a wheel, from a law and from an input with its derivatives."""
     wheel = Body("wheel", 1.0, 0.2)

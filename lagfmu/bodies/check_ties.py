@@ -126,10 +126,15 @@ def _of_numbers(part: Any) -> Iterator[str]:
         yield f"{what}: restitution is {restitution!r}, expected a number from 0 to 1"
     if isinstance(friction, tuple | list) and len(friction) != 2:
         yield f"{what}: friction is {friction!r}, expected one coefficient, or the static and the kinetic"
-    if isinstance(part, Gear) and is_number(ratio := value_of(part.ratio)) and float(ratio) == 0:
+    if isinstance(part, Gear) and _is_zero(part.ratio) and all(map(_is_zero, part.higher)):
         yield f"{what}: ratio is 0, expected another number: what does not move is Fixed"
     if isinstance(part, Motor) and part.torque is not None and part.motion is not None:
         yield f"{what}: torque and motion are given, expected one of them: the other follows"
+
+
+def _is_zero(number: Any) -> bool:
+    value = value_of(number)
+    return is_number(value) and float(value) == 0
 
 
 def _of_references(part: Any, parts: Sequence[Any]) -> Iterator[str]:

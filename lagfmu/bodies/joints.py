@@ -407,8 +407,9 @@ class Touch:
 class Gear:
     """The motions of two joints are tied: angle.FIRST = ratio * angle.SECOND + offset.
 
-    Angles are in rad, positions in m: a rack on a pinion has a ratio in m.  lambda [N.m] (or [N]) works on
-    the second body of the joint `first`.
+    Angles are in rad, positions in m: a rack on a pinion has a ratio in m.  A cam has `higher` powers too,
+    + higher[0] * angle.SECOND^2 + higher[1] * angle.SECOND^3 + ...  lambda [N.m] (or [N]) works on the second
+    body of the joint `first`.
     """
 
     name: str
@@ -416,6 +417,7 @@ class Gear:
     second: Any
     ratio: Number
     offset: Number = 0.0
+    higher: Sequence[Number] = ()
 
     def add(self, draft: Draft) -> None:
         """The one row."""
@@ -425,6 +427,11 @@ class Gear:
         offset = draft.number(self.offset, f"{self.name}.offset", a.unit, f"offset of {self.name}")
         text = f"{a.name} follows {b.name}"
         row = a.values[0] - ratio * b.values[0] - offset
+        for k, factor in enumerate(self.higher, 2):
+            per = f"{'1' if a.unit == 'rad' else 'm'}{'' if b.unit == 'rad' else f'/m^{k}'}"
+            word = f"{self.name}.higher{k}"
+            text = f"factor of power {k} of {self.name}"
+            row -= draft.number(factor, word, per, text) * b.values[0] ** k
         draft.constraints.append(Holonomic(self.name, row, text))
 
 

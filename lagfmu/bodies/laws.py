@@ -102,8 +102,12 @@ class _Acting:
         elif isinstance(part, Gear):
             effort = output(names.name(names.MULTIPLIER, name))
             self.drive(draft.motion_of(part.first), effort)
+            second = draft.motion_of(part.second)
             ratio = self.number(part.ratio, f"{name}.ratio")
-            self.drive(draft.motion_of(part.second), -ratio * effort)
+            for k, factor in enumerate(part.higher, 2):
+                slope = k * output(second.name) ** (k - 1)
+                ratio += self.number(factor, f"{name}.higher{k}") * slope
+            self.drive(second, -ratio * effort)
         elif isinstance(part, Force):
             on = self.where(draft.placed[part.at])
             force = self.given(part.force, name, draft.components)

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 import sympy as sp
+from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 from sympy.physics.vector import dynamicsymbols
 
@@ -27,7 +28,7 @@ from .body import Body, Ground, Marker
 from .check_mjcf import problems_of_files
 from .inertia import components, together
 from .joints import Fixed, Gear, Joint, Prismatic, Revolute, Spherical
-from .loads import Gravity, Motor, Rotor, Torsion
+from .loads import Gravity, Motor, Rotor, SpringDamper, Torsion
 from .rotation import onto, turn, turned_by
 from .series import Series
 from .vectors import AXES
@@ -36,7 +37,7 @@ from .words import letters
 Array = NDArray[np.float64]
 FREE, BALL, SLIDE, HINGE = range(4)  # MuJoCo's mjtJoint
 CONNECT, WELD, JOINT = range(3)  # mjtEq
-SITE = 6  # mjtObj
+SITE, SITE_OF_TENDON = 6, 3  # mjtObj, mjtWrap
 SPHERE, CAPSULE, CYLINDER, BOX = 2, 3, 5, 6  # mjtGeom
 NO_GRAVITY = 1 << 7  # mjtDisableBit
 # transmission joint or joint in parent, no dynamics, a fixed gain, no bias or an affine one
@@ -128,7 +129,7 @@ class _Reader:
         if self.problems:
             raise ModelError(self.called, self.problems)
         joints += self._equalities()
-        loads = [*self._gravity(), *self._passive(), *self._actuators()]
+        loads = [*self._gravity(), *self._passive(), *self._tendons(), *self._actuators()]
         frames = {self._name("site", s): self._site(s) for s in range(self.m.nsite)}
         if self.problems:
             raise ModelError(self.called, self.problems)
@@ -259,12 +260,15 @@ class _Reader:
             if self.roots[parent]:
                 self.problems.append(f"free joint {self._own('joint', j)!r} is not on the world")
         elif kinds == [BALL]:
-            ends: Any = [self._marker(x, np.eye(3), self.data.xanchor[j]) for x in (parent, b)]
+            ends: Any = [
+                self._marker(x, self._frame(b)[0], self.data.xanchor[j]) for x in (parent, b)
+            ]
             self.left["limits of ball joints"] += self._has_limits(j)
             yield Spherical(self.joint_names[j], *ends)
         elif kinds in ([HINGE], [SLIDE]):
             axis = self.data.xaxis[j]
-            axes = onto(np.array([0.0, 0.0, 1.0]), axis)
+            R = self._frame(b)[0]
+            axes = R @ onto(np.array([0.0, 0.0, 1.0]), R.T @ axis)
             ref, point = float(m.qpos0[m.jnt_qposadr[j]]), self.data.xanchor[j]
             first = point - ref * axis if kinds == [SLIDE] else point
             turned = axes @ turn(2, ref) if kinds == [HINGE] else axes
@@ -381,19 +385,16 @@ class _Reader:
                 yield Fixed(self._name("equality", e), first, self._within(ends[1], data[:3]))
 
     def _tied_joints(self, e: int, first: int, second: int) -> Iterator[Any]:
-        """q1 - ref1 = a0 + a1 (q2 - ref2)."""
-        m, a, name = self.m, self.m.eq_data[e][:5].tolist(), self._name("equality", e)
+        """q1 - ref1 = a0 + a1 x + ... + a4 x^4,  x = q2 - ref2."""
+        m, a, name = self.m, self.m.eq_data[e][:5], self._name("equality", e)
         start = float(m.qpos0[m.jnt_qposadr[first]])
-        if any(a[2:]):
-            self.problems.append(
-                f"equality {self._own('equality', e)!r} has the polynomial {a!r}, expected one of degree 1: "
-                "write polycoef with two numbers, and the rest of it as a row of your own"
-            )
-        elif second < 0 or not a[1]:
-            yield Motor(name, self._measure(first), motion=start + a[0])
-        else:
-            offset = start + a[0] - a[1] * float(m.qpos0[m.jnt_qposadr[second]])
-            yield Gear(name, self._measure(first), self._measure(second), a[1], offset)
+        if second < 0 or not a[1:].any():
+            yield Motor(name, self._measure(first), motion=start + float(a[0]))
+            return
+        x = Polynomial([-m.qpos0[m.jnt_qposadr[second]], 1.0])
+        offset, ratio, *higher = Polynomial(np.trim_zeros(a, "b"))(x).coef.tolist()
+        ties = self._measure(first), self._measure(second)
+        yield Gear(name, *ties, ratio, start + offset, higher)
 
     def _measure(self, j: int) -> str:
         kind = "position" if self.m.jnt_type[j] == SLIDE else "angle"
@@ -418,8 +419,7 @@ class _Reader:
             self.left["friction losses of several joints in one body"] += several and bool(
                 m.dof_frictionloss[d]
             )
-            bent = any(m.jnt_stiffnesspoly[j]) or any(m.dof_dampingpoly[d])
-            self.left["springs and dampers of higher degree"] += bent
+            self.left["springs and dampers of higher degree"] += self._has_powers("jnt", j)
             if values[0] or values[1]:
                 slack = float(m.qpos_spring[m.jnt_qposadr[j]]) if values[0] else 0.0
                 spring = self._added(f"{name}_spring")
@@ -427,10 +427,36 @@ class _Reader:
             if values[2]:
                 yield Rotor(self._added(f"{name}_rotor"), self._measure(j), values[2])
 
+    def _tendons(self) -> Iterator[SpringDamper]:
+        """A straight one from site to site pulls as a spring does; where it has no spring and damper it is
+        nothing."""
+        m = self.m
+        for t in range(m.ntendon):
+            wraps = range(m.tendon_adr[t], m.tendon_adr[t] + m.tendon_num[t])
+            straight = [int(m.wrap_type[w]) for w in wraps] == [SITE_OF_TENDON] * 2
+            k, c = float(m.tendon_stiffness[t]), float(m.tendon_damping[t])
+            slack, taut = map(float, m.tendon_lengthspring[t])
+            more = m.tendon_limited[t] or m.tendon_frictionloss[t] or m.tendon_armature[t]
+            bent = self._has_powers("tendon", t)
+            if (k or c) and straight and slack == taut and not more and not bent:
+                first, second = (self._site(int(m.wrap_objid[w])) for w in wraps)
+                yield SpringDamper(
+                    self._name("tendon", t), first, second, k, slack if k else 0.0, c
+                )
+            else:
+                self.left["tendons that are no spring between two sites"] += 1
+
+    def _has_powers(self, kind: str, k: int) -> bool:
+        """Whether a spring or damper of a joint or tendon is not linear."""
+        names = f"{kind}_stiffnesspoly", f"{'dof' if kind == 'jnt' else kind}_dampingpoly"
+        rows = k, int(self.m.jnt_dofadr[k]) if kind == "jnt" else k
+        found = (getattr(self.m, name, None) for name in names)  # newer than version 3.3
+        return any(of is not None and of[row].any() for of, row in zip(found, rows, strict=True))
+
     def _actuators(self) -> Iterator[Any]:
         """gain u + b0 + b1 (gear q) + b2 (gear q'), times the gear."""
         m = self.m
-        for a in range(m.nactuator if self.actuators else 0):
+        for a in range(len(m.actuator_trntype) if self.actuators else 0):
             j, gear = int(m.actuator_trnid[a][0]), float(m.actuator_gear[a][0])
             kinds = m.actuator_trntype, m.actuator_dyntype, m.actuator_gaintype, m.actuator_biastype
             kind = tuple(int(of[a]) for of in kinds)
@@ -462,9 +488,8 @@ class _Reader:
         value = float(self.m.actuator_gear[a][0] * self.m.actuator_gainprm[a][0])
         self.parameters.append(Parameter(gain, value, per, f"gear times gain of {name}"))
         control = dynamicsymbols(f"{name}.control")
-        start = (
-            float(self.m.key_ctrl[self.key][self.m.actuator_ctrladr[a]]) if self.key >= 0 else 0.0
-        )
+        place = getattr(self.m, "actuator_ctrladr", range(a + 1))[a]  # one each before version 4
+        start = float(self.m.key_ctrl[self.key][place]) if self.key >= 0 else 0.0
         self.inputs.append(Input(control, unit, start, f"control of {name}"))
         return gain * control
 
@@ -526,7 +551,6 @@ class _Reader:
     def _tell(self) -> None:
         m = self.m
         self.left["geoms that can touch"] += int(((m.geom_contype | m.geom_conaffinity) != 0).sum())
-        self.left["tendons"] += m.ntendon
         self.left["skins"] += m.nskin
         self.left["flexes"] += m.nflex
         self.left["sensors"] += m.nsensor
