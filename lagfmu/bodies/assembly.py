@@ -25,11 +25,11 @@ from ..model.model import Model
 from ..names import derivative
 from .branches import CLOSED, has_loop, is_small, other_angles, tell_second_branch
 from .draft import Draft
-from .given import Beginning, GivenStartWarning, given_values, known_names
 from .guess import guessed
 from .moving import moving_of
 from .nearest import Nearest
 from .rows import Array, Rows, condition
+from .start_values import Beginning, GivenStartWarning, given_values, known_names
 from .unclosed import left_open, parallel, turned_over, unfollowed
 
 EPS = float(np.finfo(float).eps)

@@ -22,7 +22,7 @@ from .picture import picture_of
 from .plane import PlaneMotion
 from .readings import readings_of
 from .space import SpaceMotion
-from .told import lines_of
+from .summary import lines_of
 from .unusual import coinciding, warn_of_radii
 from .vectors import AXES
 

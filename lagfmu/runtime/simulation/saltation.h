@@ -1,4 +1,4 @@
-/* saltation.h -- what kept.c, beside.c and saltation.c share. */
+/* saltation.h -- what saltation_state.c, saltation_differences.c and saltation.c share. */
 #ifndef LAGFMU_SALTATION_H
 #define LAGFMU_SALTATION_H
 
@@ -53,7 +53,7 @@ typedef struct {
 /* phi (states) at (t, y). */
 SHARED Status saltation_flow(Solver *s, double t, const double *y, double *flow);
 
-/* kept.c: z (column_size()) of the state, and back. */
+/* saltation_state.c: z (column_size()) of the state, and back. */
 SHARED void saltation_gather(const Solver *s, double *z);
 SHARED void saltation_scatter(Solver *s, const double *z);
 
@@ -61,7 +61,7 @@ SHARED void saltation_scatter(Solver *s, const double *z);
 SHARED void saltation_modes(const Solver *s, double *modes);
 SHARED int saltation_modes_size(const System *s);
 
-/* beside.c: changes of the values at y, in s->sensitivity, along dy and p[parameter]. */
+/* saltation_differences.c: changes of the values at y, in s->sensitivity, along dy and p[parameter]. */
 SHARED void saltation_values_along(Solver *s, Instant at, const double *y, const double *dy, int parameter);
 
 /* x->slope and x->bend of the limits, which are x->level at time t, along a way. */

@@ -112,7 +112,7 @@ SHARED Status solver_advance(Solver *s, double t_end);
 /* The event that is pending, if there is one: the modes after it, the limit from the right.  FAILED as above. */
 SHARED Status solver_meet(Solver *s);
 
-/* follow.c -- the inputs may have been set: switch states are those of now, contacts whose surface went away
+/* input_jump.c -- the inputs may have been set: switch states are those of now, contacts whose surface went away
  * open, the others go with it; a prescribed motion may have another place and other rates than it went by, and
  * forces others than the modes of contacts and frictions belong to (drive.turned).  What each step begins
  * with.  FAILED leaves the state in disorder. */

@@ -123,4 +123,4 @@ static Status variation_project(Solver *s, Instant at, double *y) {
 }
 
 SHARED_VALUE const Variation VARIATION = {saltation_layout, variation_rates, variation_stepped, variation_project, saltation_start,
-                                          saltation_pass,   saltation_jump,  unwatched_look,    saltation_ended};
+                                          saltation_pass,   saltation_jump,  acceleration_jump_look,    saltation_ended};

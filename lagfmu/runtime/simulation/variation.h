@@ -48,7 +48,7 @@ SHARED Status saltation_pass(Solver *s, Map map);
 SHARED Status saltation_jump(Solver *s, Map map);
 SHARED const char *saltation_ended(Solver *s, Why *text);
 
-/* unwatched.c */
-SHARED void unwatched_look(Solver *s);
+/* acceleration_jump.c */
+SHARED void acceleration_jump_look(Solver *s);
 
 #endif

@@ -1,4 +1,4 @@
-/* unwatched.c -- jumps of the accelerations that no event announces: the force of a spring whose length passes through
+/* acceleration_jump.c -- jumps of the accelerations that no event announces: the force of a spring whose length passes through
  * 0 turns round at an instant.
  *
  * A step goes over such a jump as the error control lets it, so short that the state is right; but its columns know
@@ -51,7 +51,7 @@ static int liveliest(const Solver *s, double h, const double *f0, const double *
     return found;
 }
 
-void unwatched_look(Solver *s) {
+void acceleration_jump_look(Solver *s) {
     const Integrator *i = &s->integrator;
     const Method *method = i->method;
     const int nq = s->system->nq;

@@ -1,4 +1,4 @@
-/* kept.c -- what a state keeps that a run's derivatives are of, and how it stands (variation.h: a column). */
+/* saltation_state.c -- what a state keeps that a run's derivatives are of, and how it stands (variation.h: a column). */
 #include "saltation.h"
 
 int saltation_modes_size(const System *s) {

@@ -1,4 +1,4 @@
-/* follow.c -- the state with which a step begins after inputs were set, to which everything belongs that is read
+/* input_jump.c -- the state with which a step begins after inputs were set, to which everything belongs that is read
  * before that step: the limit from the right.
  *
  * Switches have the states of now, what a prescribed motion carries goes with it, and modes that the

@@ -1,4 +1,4 @@
-/* beside.c -- derivatives of limits and of maps by states a little beside an event, or a start: central differences of
+/* saltation_differences.c -- derivatives of limits and of maps by states a little beside an event, or a start: central differences of
  * fourth order,
  *
  *   g'(0) = (g(-2 d) - 8 g(-d) + 8 g(d) - g(2 d)) / (12 d) ,
