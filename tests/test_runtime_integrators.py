@@ -17,6 +17,7 @@ SOURCES = (
     "status.c",
     "integrator.c",
     "step_size.c",
+    "refused_step.c",
     "dop853.c",
     "rk4.c",
     "radau5.c",

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from .. import names
 from ..errors import SimulationError, VerificationError
 from ..model.rule import Rule
+from ..numeric.tolerance import DEFAULT_TOLERANCE
 from .archive import opened, platforms
 from .target import NATIVE, PYTHON
 
@@ -45,7 +46,7 @@ def experiment_of(
     step = step_size
     if step is None:
         step = float(getattr(said, "stepSize", None) or stop / 500)
-    return Experiment(stop, step, float(getattr(said, "tolerance", None) or 1e-8))
+    return Experiment(stop, step, float(getattr(said, "tolerance", None) or DEFAULT_TOLERANCE))
 
 
 def communication_points(stop_time: float, step_size: float) -> NDArray[np.float64]:

@@ -22,10 +22,9 @@ from .motion import NONE, motion, stick_slip
 from .nominals import in_speeds, motion_speeds, natural, sizes
 from .start_priority import GIVEN, Moved
 from .system import Sparse, System, Vector
-from .thresholds import LARGEST_ANGLE, LOST, ROUNDINGS, TOUCH
+from .thresholds import LARGEST_ANGLE, LOST, MOVED, ROUNDINGS, TOUCH
 
 SMALLEST_MASS = float(np.finfo(float).tiny)  # below it a double has fewer digits
-MOVED = 1e-12  # part of a value by which it has moved
 
 
 @dataclass(frozen=True)

@@ -18,9 +18,9 @@
 #include <string.h>
 
 #include "digits.h"
+#include "thresholds.h"
 
 enum { PROJECTION_ITERATIONS = 10 };
-static const double PROJECTION_SMALL = 1e-12; /* relative residual that rounding may leave */
 static const double PROJECTION_ROUNDING = 100 * DBL_EPSILON; /* and where Newton's method that gains slowly
                                                               * is left in peace */
 static const double PROJECTION_LINEAR = 0.1; /* ratio of successive errors: convergence is linear, G loses rank */

@@ -108,13 +108,13 @@ static Status rattle_step(Integrator *i, const Ode *ode, const Control *control,
     const Fixed fixed = step_size_fixed(i->t, t_bound, control->fixed_step);
     double *y = i->scratch, *step = y + ny;
     if (!(fabs(fixed.h) > 0))
-        return step_size_stop(b->why, i->t, "no step leads to the bound", 0);
+        return refused_step(b->why, i->t, "no step leads to the bound", 0);
     memcpy(y, i->y, (size_t)ny * sizeof *y);
     const Instant start = {i->t, of->u, of->p};
     if (composed_step(b, start, fixed.t_new, fixed.h, of->active, of->offset, y, step) != OK)
-        return step_size_stop(b->why, i->t, "a stage of rattle fails", 1);
+        return refused_step(b->why, i->t, "a stage of rattle fails", 1);
     if (!step_size_finite(ny, y))
-        return step_size_stop(b->why, i->t, "the state is not finite", 0);
+        return refused_step(b->why, i->t, "the state is not finite", 0);
     memcpy(i->y_old, i->y, (size_t)ny * sizeof *y);
     memcpy(i->y, y, (size_t)ny * sizeof *y);
     i->t_old = i->t;

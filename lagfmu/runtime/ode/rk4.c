@@ -33,12 +33,12 @@ static Status rk4_step(Integrator *i, const Ode *ode, const Control *control, do
     const Fixed step = step_size_fixed(i->t, t_bound, control->fixed_step);
     const double h = step.h;
     double *k4 = i->scratch + 2 * n, *f1 = k4 + n, *y1 = f1 + n;
-    if (!(fabs(h) > 0)) return step_size_stop(ode->why, i->t, "no step leads to the bound", 0);
+    if (!(fabs(h) > 0)) return refused_step(ode->why, i->t, "no step leads to the bound", 0);
     if (step_size_rate(i, ode) != OK) return FAILED;
     if (rk4_stages(i, ode, h, step.t_new, i->scratch) != OK)
-        return step_size_stop(ode->why, i->t, "a stage cannot be evaluated", 1);
+        return refused_step(ode->why, i->t, "a stage cannot be evaluated", 1);
     if (!step_size_finite(2 * n, f1))
-        return step_size_stop(ode->why, i->t, "the state is not finite", 0);
+        return refused_step(ode->why, i->t, "the state is not finite", 0);
     for (int j = 0; j < n; j++) {
         i->dense[ERROR * n + j] = h / 6 * (k4[j] - f1[j]);
         i->dense[DIFFERENCE * n + j] = y1[j] - i->y[j];

@@ -5,11 +5,10 @@
  * h is a floating-point number: the time that y has travelled is the time that the clock shows. */
 #include "step_size.h"
 
+#include <limits.h>
+
 #include "digits.h"
 #include "numbers.h"
-
-#include <limits.h>
-#include <string.h>
 
 static const double STRETCH = 1.01;     /* the most by which a step is stretched to reach t_bound */
 static const double FIRST_PART = 1e-3;  /* of the way to t_bound: a first step when nothing moves */
@@ -33,7 +32,7 @@ Status step_size_rate(Integrator *i, const Ode *ode) {
     if (!i->fresh) return OK;
     if (ode->rate(ode->context, i->t, i->y, i->f) != OK) return FAILED;
     if (!step_size_finite(i->ny, i->f))
-        return step_size_stop(ode->why, i->t, "the rate of change is not finite", 0);
+        return refused_step(ode->why, i->t, "the rate of change is not finite", 0);
     i->fresh = 0;
     return OK;
 }
@@ -100,17 +99,14 @@ Status trial_begin(Trial *trial, Integrator *i, const Ode *ode, const Control *c
     trial->rejected = trial->unevaluated = 0;
     fit(trial, i->t, h);
     if (trial->h > 0) return OK;
-    return fail(ode->why,
-                "the integration stops at t = %s s, step size underflow: the motion is so quick that a step "
-                "of %.3g s leads to no later time (measure time in a smaller unit)",
-                digits(i->t).text, h);
+    return refused_underflow(ode->why, i->t, h);
 }
 
 Status trial_reject(Trial *trial, const Integrator *i, const Ode *ode, double factor) {
     double h = trial->h * factor;
     trial->rejected++;
     if (trial->rejected == MOST_TRIALS || h < 10 * DBL_EPSILON * fabs(i->t))
-        return step_size_stop(ode->why, i->t, "step size underflow", trial->unevaluated);
+        return refused_step(ode->why, i->t, "step size underflow", trial->unevaluated);
     trial->unevaluated = 0;
     fit(trial, i->t, h);
     return OK;
@@ -128,13 +124,6 @@ void trial_accept(const Trial *trial, Integrator *i, const double *y_new, double
     i->t_old = i->t;
     i->t = trial->t_new;
     i->fresh = 1;
-}
-
-Status step_size_stop(Why *why, double t, const char *reason, int has_cause) {
-    char cause[WHY_LENGTH];
-    memcpy(cause, why->text, sizeof cause);
-    return fail(why, "the integration stops at t = %s s, %s%s%s", digits(t).text, reason,
-                has_cause ? ": " : "", has_cause ? cause : "");
 }
 
 int step_size_finite(int n, const double *x) {

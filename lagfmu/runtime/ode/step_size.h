@@ -4,6 +4,7 @@
 #define LAGFMU_STEP_SIZE_H
 
 #include "integrator.h"
+#include "refused_step.h"
 #include "linkage.h"
 
 #include <float.h>
@@ -49,9 +50,6 @@ SHARED Status trial_reject(Trial *trial, const Integrator *i, const Ode *ode, do
 SHARED void trial_accept(const Trial *trial, Integrator *i, const double *y_new, double factor);
 
 SHARED int step_size_finite(int n, const double *x);
-
-/* FAILED: "the integration stops at t, REASON", followed by what `why` says if has_cause. */
-SHARED Status step_size_stop(Why *why, double t, const char *reason, int has_cause);
 
 /* The next of the steps that divide the way to t_bound evenly, none longer than fixed_step
  * (backwards in time if t_bound < t); `left`: how many follow it. */

@@ -13,6 +13,7 @@
 #include "indicators.h"
 #include "nominals.h"
 #include "optional.h"
+#include "refused_step.h"
 #include "segment.h"
 #include "column.h"
 
@@ -348,18 +349,11 @@ static Status check_headway(Solver *s, double t_end, double begun, Count first) 
     const double h = t - i->t_old, pace = h * now->rate < HEADWAY ? nominals_pace(s) : now->rate;
     if (h * pace < HEADWAY) now->tiny += 1;
     if (most > 0 && (double)now->tiny > most) {
-        (void)fail(&s->why,
-                   "the communication step to t = %.17g s makes no headway at t = %.17g s: more than "
-                   "%.0f internal steps (solver.maximum_steps) were shorter than %.2g s, %.0e of the "
-                   "motion's natural time",
-                   t_end, t, most, HEADWAY / pace, HEADWAY);
+        (void)refused_headway(&s->why, t, t_end, most, HEADWAY / pace, HEADWAY);
         return tell_of_chatter(s, t - most * HEADWAY / pace, JUMPS);
     }
     if (done >= PATIENCE && done * (t_end - begun) > STEP_LIMIT * gone) {
-        (void)fail(&s->why,
-                   "the communication step to t = %.17g s would need more than %.0e internal steps, "
-                   "%.0f took it from t = %.17g s to %.17g s",
-                   t_end, STEP_LIMIT, done, begun, t);
+        (void)refused_length(&s->why, t, t_end, STEP_LIMIT, done, begun);
         return tell_of_chatter(s, begun, ": take a shorter one");
     }
     return OK;
@@ -421,7 +415,7 @@ static Status check_crowd(Solver *s) {
     }
     x->crowd += 1;
     if (x->crowd < CHATTER) return OK;
-    (void)fail(&s->why, "%d events in %.1g s at t = %.17g s", CHATTER, now->t - x->crowd_since, now->t);
+    (void)refused_crowd(&s->why, now->t, CHATTER, now->t - x->crowd_since);
     return tell_of_chatter(s, x->crowd_since, JUMPS);
 }
 

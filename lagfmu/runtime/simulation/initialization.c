@@ -228,7 +228,7 @@ void initial_moved(const Start *x, Moved moved, void *context) {
         double unit = fmax(is_velocity ? state->scale[i] : state->size[j], fabs(given));
         /* a velocity that is rounding of the motion's own has not moved */
         double rounding = 4 * DBL_EPSILON * nominals_natural(x->s, i);
-        if (fabs(given - used) > fmax(1e-12 * unit, rounding))
+        if (fabs(given - used) > fmax(MOVED * unit, rounding))
             moved(context, i, given, used, is_velocity ? x->priority_v[j] : x->priority_q[j]);
     }
 }

@@ -19,7 +19,6 @@
 
 enum { JOINT_STEPS = 1000, JOINT_HALVINGS = 12 };
 static const double JOINT_SHORT = 0.25;    /* [rad], or of what a speed moves */
-static const double JOINT_REACHED = 1e-12; /* relative to the terms */
 
 /* The priorities from which joint coordinates and others are held at each level; whether other joint coordinates stay
  * where they are left free. */
@@ -49,7 +48,7 @@ static Status find_joint_places(Solver *s, int *rows) {
     memset(x->c, 0, (size_t)of->m * sizeof *x->c);
     joint_measure(s, x->q);
     double off = joint_missing(s, NULL);
-    for (int count = 0, there = off <= JOINT_REACHED; count < JOINT_STEPS && there < 2; count++) {
+    for (int count = 0, there = off <= PROJECTION_SMALL; count < JOINT_STEPS && there < 2; count++) {
         double far = 0, less = HUGE_VAL;
         if (mechanism_evaluate(&s->stepped, x->at, x->q, x->zero) != OK || joint_step(s, rows) != OK) return FAILED;
         for (int i = 0; i < of->nv; i++)
@@ -62,9 +61,9 @@ static Status find_joint_places(Solver *s, int *rows) {
         if (!(less < (1 - 0.1 * part) * off)) break;
         memcpy(x->q, x->trial, (size_t)of->nq * sizeof *x->q);
         off = less;
-        there += off <= JOINT_REACHED; /* one step more leaves rounding */
+        there += off <= PROJECTION_SMALL; /* one step more leaves rounding */
     }
-    return off <= JOINT_REACHED ? OK : FAILED;
+    return off <= PROJECTION_SMALL ? OK : FAILED;
 }
 
 /* v at x->q with G v = nu and nothing missing; the second sweep removes rounding of the first. */
@@ -77,7 +76,7 @@ static Status find_joint_rates(Solver *s, const int *rows) {
         for (int k = 0; k < s->system->m; k++) x->c[k] = -mechanism_slip(&s->stepped, k, x->v);
         if (joint_step(s, rows) != OK) return FAILED;
         add_part(s->system->nv, 1, x->d, x->v);
-        if (joint_missing(s, x->v) <= JOINT_REACHED) return OK;
+        if (joint_missing(s, x->v) <= PROJECTION_SMALL) return OK;
     }
     return FAILED;
 }

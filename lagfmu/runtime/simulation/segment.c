@@ -8,6 +8,7 @@
 
 #include "nominals.h"
 #include "optional.h"
+#include "refused_step.h"
 #include "sensitivity.h"
 #include "step_size.h"
 
@@ -143,10 +144,7 @@ static Status check_fixed_step(Solver *s, const Integrator *i) {
     for (int j = 0; j < system_states(s->system); j++) {
         const double size = nominals_natural(s, j);
         if (!(fabs(i->method->error(i, j)) <= HOPELESS * fmax(fabs(i->y[j]), size)))
-            return fail(&s->why,
-                        "the integration stops at t = %.17g s, %s's step of %.3g s is far too "
-                        "large: reduce solver.step",
-                        i->t_old, i->method->name, i->t - i->t_old);
+            return refused_fixed_step(&s->why, i->t_old, i->method->name, i->t - i->t_old);
     }
     return OK;
 }
@@ -250,10 +248,8 @@ Status segment_check_projection(Solver *s, double t, const double *y, const doub
         const double known = fmax(fmax(fabs(y[j]), size), s->scale[j]); /* as the step's error */
         const StateName of = system_state_name(s->system, j);
         if (!(moved <= far * known) && !is_balanced(s, j, moved))
-            return fail(&s->why,
-                        "the integration stops at t = %.17g s, the projection onto the constraints "
-                        "moves %s%s%s by %.3g: the configuration is singular, or nearly so",
-                        t, of.head, of.name, of.tail, projected[j] - y[j]);
+            return refused_projection(&s->why, t, (const char *const[]){of.head, of.name, of.tail},
+                                      projected[j] - y[j]);
     }
     return OK;
 }

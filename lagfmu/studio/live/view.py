@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,9 +12,13 @@ import numpy as np
 from .moving import TOWARDS, Array, Moving
 from .solids import shade
 
-INK, FORCE, FILL, BOB = "#48525e", "#c2410c", "#dbe3ec", "#1f5fa8"
+PAGE = Path(__file__).parent / "web" / "page.css"  # has the colours, of light paper first
+INK, FORCE, FILL, BOB = (
+    re.findall(rf"--{name}: (#\w+)", PAGE.read_text(encoding="utf-8"))[0]
+    for name in ("metal", "force", "fill", "accent")
+)
 SOLID = "#c3d2e2"
-FRAME = ("#c2410c", "#1b7a45", "#1f5fa8")  # x, y, z
+FRAME = (FORCE, "#1b7a45", BOB)  # x, y, z
 LONGEST = 0.2  # of what moves: the arrow of the largest force
 LETTER, LINE = 7.5, 15  # pixels at 100 a inch, of a label
 TINY = 1e-300  # N

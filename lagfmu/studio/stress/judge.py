@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ... import names
+from ...numeric import thresholds
 from ...verification.closed_forms import landed
 from ...verification.evaluate import Compiled
 from .closed_forms import JudgedForm
@@ -33,7 +34,7 @@ EPS = float(np.finfo(float).eps)
 ROUNDING = 200 * EPS  # of a residual, relative to its own size
 TIED = 14 * 3**0.5  # of the largest length: what the size of a joint's row is at most (_size)
 NOTHING = EPS**2 / ROUNDING  # of the usual place: the square of its rounding is nothing
-GAP = 4e-9  # of f's own size: nearer than a quarter of that a contact touches
+GAP = 4 * thresholds.TOUCH  # of f's own size: nearer than a quarter of that a contact touches
 Column = NDArray[np.float64]
 
 
