@@ -402,6 +402,10 @@ class Parts:
         return Function(name, doc, {**arguments, **along}, changes)
 
 
+class Largest(sp.Function):  # type: ignore[misc]
+    """The largest of its arguments; unlike sp.Max it compares none of them, which takes SymPy seconds."""
+
+
 def magnitude(e: Expr) -> Expr:
     """The largest magnitude among the terms of which e is made, those of its factors with them; a sine
     or cosine stands beside 1."""
@@ -418,7 +422,7 @@ def magnitude(e: Expr) -> Expr:
 
 def _largest(magnitudes: Sequence[Expr]) -> Expr:
     different = list(dict.fromkeys(magnitudes))
-    return different[0] if len(different) == 1 else sp.Max(*different, evaluate=False)
+    return different[0] if len(different) == 1 else Largest(*different)
 
 
 def _or_zero(expressions: Any) -> list[Expr]:

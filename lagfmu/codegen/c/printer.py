@@ -18,6 +18,7 @@ from ...errors import DerivationError
 from ...model.differential import Share
 from ...model.elements import Expr
 from ..identifier import identifier
+from ..parts import Largest
 
 Text = tuple[str, int]  # of an expression, and how tightly its outermost operator binds
 SUM, PRODUCT, ATOM = range(3)
@@ -193,8 +194,8 @@ class Printer:
             return self._product(e)
         if e.is_Pow:
             return self._power(e)
-        if isinstance(e, (sp.Max, sp.Min)):
-            return self._extreme("fmax" if isinstance(e, sp.Max) else "fmin", e.args), ATOM
+        if isinstance(e, (sp.Max, sp.Min, Largest)):
+            return self._extreme("fmin" if isinstance(e, sp.Min) else "fmax", e.args), ATOM
         if isinstance(e, sp.Piecewise):
             return self._piecewise(e), ATOM
         if isinstance(e, sp.Mod):

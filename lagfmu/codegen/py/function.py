@@ -57,6 +57,9 @@ class Printer(PythonCodePrinter):  # type: ignore[misc]
         parts = (terms[k : k + MOST_TERMS] for k in range(0, len(terms), MOST_TERMS))
         return " + ".join(f"({self._print(sp.Add(*part, evaluate=False))})" for part in parts)
 
+    def _print_Largest(self, e: Expr) -> str:
+        return f"max({', '.join(map(self._print, e.args))})"
+
     def _print_Integer(self, number: Expr) -> str:
         return str(number) if abs(int(number)) < 2**53 else repr(float(number))
 
