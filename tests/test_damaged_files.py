@@ -16,6 +16,10 @@ BOMB = "".join(f'<!ENTITY e{k + 1} "{f"&e{k};" * 10}">' for k in range(12))
 BOMB = f'<!DOCTYPE r [<!ENTITY e0 "lol">{BOMB}]>'
 XXE = '<!DOCTYPE r [<!ENTITY e SYSTEM "file:///etc/passwd">]>'
 DOCTYPE = "has a DOCTYPE, whose entities are not read: write what they stand for in place"
+LINE = (
+    '<inertia ixx="0.8888888888888888" iyy="0.5555555555555556" izz="0.5555555555555557" '
+    'ixy="-0.2222222222222222" ixz="-0.2222222222222222" iyz="-0.4444444444444444"/>'
+)
 LIMIT = '<limit lower="{}" upper="{}"/>'
 
 
@@ -104,6 +108,10 @@ URDF: dict[str, tuple[str, str]] = {
     "an impossible inertia": (
         text(BASE, link("a", MASS.replace('izz="1"', 'izz="9"')), HINGE),
         "body 'a' has the principal moments of inertia 1, 1, 9 .*none is above the sum",
+    ),
+    "the inertia of a line": (  # along (1, 2, 2), but for rounding: its forces would be noise
+        text(BASE, link("a", f'<inertial><mass value="1"/>{LINE}</inertial>'), HINGE),
+        "body 'a' has the principal moments of inertia .*, expected positive ones",
     ),
     "another kind": (
         with_hinge(old="revolute", new="screw"),

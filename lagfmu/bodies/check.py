@@ -26,6 +26,7 @@ from .space import PAIRS
 PARTS = (Joint, Distance, PointOnCurve, Rolling, Gear, Contact)
 PARTS += (Gravity, SpringDamper, Torsion, Force, Torque, Motor, Rotor)  # type: ignore[assignment]
 ROUNDED = 1e-3  # of the largest moment, by which an inertia may miss an inequality
+SINGULAR = 1e-12  # of the largest moment: the least that is none
 PLANES = (None, "xy")
 
 
@@ -135,14 +136,15 @@ def _of_tensor(what: str, inertia: Sequence[Any]) -> Iterator[str]:
     xx, yy, zz, xy, xz, yz = [*map(float, values), 0.0, 0.0, 0.0][:6]
     least, middle, most = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]).tolist()
     missed = most - (least + middle)
-    if least > 0 and 1e-9 * most < missed < ROUNDED * most:
+    positive = least > SINGULAR * most
+    if positive and 1e-9 * most < missed < ROUNDED * most:
         warnings.warn(
             f"{what}: its largest principal moment of inertia, {most!r} kg.m^2, is above the sum of the "
             f"others, {least + middle!r}, by what a program rounds: it is used as it is",
             LagfmuWarning,
             stacklevel=2,
         )
-    elif least <= 0 or missed > 1e-9 * most:
+    elif not positive or missed > 1e-9 * most:
         yield (
             f"{what} has the principal moments of inertia {least:.6g}, {middle:.6g}, {most:.6g} kg.m^2, "
             "expected positive ones of which none is above the sum of the others: no distribution of "
