@@ -182,6 +182,23 @@ def test_a_method_is_one_file(method: str) -> None:
     assert HOUSE["places"](ROOT, method) == 3
 
 
+@pytest.mark.parametrize(
+    ("said", "place"),
+    [
+        ("the integration stops at", "runtime/ode/refused_step.c"),
+        ("makes no headway", "runtime/ode/refused_step.c"),
+        ("#c2410c", "studio/live/web/page.css"),
+        ("DEFAULT_TOLERANCE = 1e-8", "numeric/tolerance.py"),
+        ("PROJECTION_SMALL =", "runtime/base/thresholds.h"),
+    ],
+)
+def test_a_fact_stands_in_one_place(said: str, place: str) -> None:
+    """The words of a refused step, the colour of forces, a tolerance."""
+    files = (p for p in ROOT.rglob("*.*") if p.suffix in (".c", ".h", ".py", ".css", ".js", ".j2"))
+    code = (p for p in files if "vendor" not in p.parts and p.name != "refused_step.h")
+    assert [p.relative_to(ROOT).as_posix() for p in code if said in p.read_text("utf-8")] == [place]
+
+
 def test_the_solver_is_no_store_of_scratch() -> None:
     """What a part of the simulation needs for itself it keeps in memory that is laid out in its own files."""
     assert HOUSE["members"](ROOT / "runtime" / "simulation" / "solver.h") <= 30
