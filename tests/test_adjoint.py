@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from redundant import platform
-from sympy import Piecewise, sqrt, symbols
+from sympy import Abs, Piecewise, sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Model, Output, Parameter, Scene
@@ -132,6 +132,25 @@ def test_a_slope_that_is_no_number_stays_with_its_output(library3, built):
         0,
     ]
     assert "derivative of 'speed'" in one.refuses("GetAdjointDerivative", *asks(one, "speed", "x"))
+
+
+def test_a_force_of_infinite_slope_is_told_and_its_neighbours_have_theirs(library3, built):
+    """m x'' = -k sqrt(L |x|), whose slope at x = 0 is infinite, beside m y'' = -k y, which the same step
+    of the chain rule asks: d x''/dx is refused, d y''/dy = -k/m."""
+    x, y = dynamicsymbols("x y")
+    m, k, L = symbols("m k L", positive=True)
+    model = Model(
+        name="Steep",
+        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2,
+        forces={x: -k * sqrt(L * Abs(x)), y: -k * y},
+        coordinates={x: "m", y: "m"},
+        parameters=[Parameter(m, 1, "kg"), Parameter(k, 2, "N/m"), Parameter(L, 1, "m")],
+        start={x: 0.0, y: 0.5},
+    )
+    one = library3(built(model, Scene("Steep"), fmi=3))().start()
+    asked = ["der(x,2)", "der(y,2)"]
+    one.refuses("GetAdjointDerivative", *asks(one, "der(x,2)", "x"))
+    assert one.derive("GetAdjointDerivative", asked, ["y"], [0.0, 1.0]) == [-2]
 
 
 def test_a_constraint_runs_away_from_what_stands_still(library3):

@@ -16,10 +16,11 @@ from instance import instance
 from linkages import rods
 from redundant import SYSTEMS
 from runs import simulate_fmu
-from sympy import sqrt
+from sympy import sqrt, symbols
+from sympy.physics.mechanics import dynamicsymbols
 from tops import door
 
-from lagfmu import Model, Output, Scene, multiplier, simulate
+from lagfmu import Contact, Model, Output, Parameter, Scene, multiplier, simulate
 from lagfmu.errors import ModelError
 from lagfmu.testing import Stage, prepare
 
@@ -222,6 +223,41 @@ def test_a_unique_output_has_a_derivative_where_its_multipliers_have_none(built)
         )
         with pytest.raises(FMICallException):
             one.fmu.getDirectionalDerivative([one_alone], known, [1.0])
+
+
+@pytest.mark.parametrize("target", ["native", "python"])
+def test_a_force_is_not_unique_as_long_as_what_is_redundant_is_closed(target):
+    """A block falls onto two props of one height and is pulled up with m g t/(1 s): in the air either force
+    is 0 and unique; on both their sum, m g (1 - t/(1 s)), is, and neither is; after 1 s both are again."""
+    y = dynamicsymbols("y")
+    m, g, T, h = symbols("m g T h", positive=True)
+    left, right = multiplier("left"), multiplier("right")
+    block = Model(
+        name="Props",
+        lagrangian=m * y.diff() ** 2 / 2 - m * g * y,
+        forces={y: m * g * dynamicsymbols._t / T},
+        coordinates={y: "m"},
+        constraints=[Contact("left", y), Contact("right", y)],
+        parameters=[
+            Parameter(m, 2.0, "kg"),
+            Parameter(g, 9.81, "m/s^2"),
+            Parameter(T, 1.0, "s"),
+            Parameter(h, 0.2, "m"),
+        ],
+        start={y: h},
+        outputs=[
+            Output("one", left, "N", unique=True),
+            Output("both", left + right, "N", unique=True),
+        ],
+    )
+    run = simulate(block, target=target, stop_time=1.3, step_size=0.05, tolerance=1e-9)
+    t, closed = run["time"], run["contact.left"] & run["contact.right"]
+    np.testing.assert_array_equal(run["contact.left"], run["contact.right"])
+    assert [*closed[[0, 3, 5, 19, 21, 26]]] == [False, False, True, True, False, False]
+    np.testing.assert_array_equal(run["unique.one"], ~closed)
+    np.testing.assert_array_equal(run["unique.left"], ~closed)
+    assert run["unique.both"].all()
+    np.testing.assert_allclose(run["both"], np.where(closed, 2 * 9.81 * (1 - t), 0), atol=1e-9)
 
 
 def test_what_is_unique_may_be_read_alone(built):

@@ -99,15 +99,15 @@ static Status slide_on(Solver *s, const double *y1) {
     double lost;
     if (now->event_count > 0) return OK; /* the work is done as far as the event: meet() */
     if (OPTIONAL.friction->work(s, i->t_old, i->t, &lost) != OK) return FAILED;
-    now->lost_ahead += lost;
-    return OPTIONAL.friction->turn(s, i->t, y1);
+    if (OPTIONAL.friction->turn(s, i->t, y1) != OK) return FAILED;
+    now->lost_ahead += lost; /* of a step that stands: one that failed is taken again */
+    return OK;
 }
 
 /* To where the integrator stood at t, before a step that failed or cannot be used; h: to try next. */
 static void take_back(Solver *s, double t, double h) {
     const Integrator *i = &s->integrator;
     double *y = s->part.advance->y;
-    if (i->t > t) s->state.now.lost_ahead = s->state.now.lost_old;
     memcpy(y, i->t > t ? i->y_old : i->y, (size_t)i->ny * sizeof *y);
     restart(s, t, y, h);
     s->state.now.event_count = 0;
