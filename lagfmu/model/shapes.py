@@ -5,6 +5,7 @@ than one component.  Each is named with what to write instead.
 from __future__ import annotations
 
 import sympy as sp
+from sympy.core.function import AppliedUndef
 from sympy.physics.vector.dyadic import Dyadic
 from sympy.physics.vector.vector import Vector
 
@@ -65,6 +66,9 @@ def unusable_surfaces(model: ModelFields) -> list[str]:
 
 def _is_squared(f: Expr, moving: set[Expr]) -> bool:
     """A product, of the factors of which that vanish each is a square or a higher power."""
+    terms = sp.Add.make_args(f)
+    if len(terms) > 1 and not set.intersection(*(e.atoms(AppliedUndef) for e in terms)):
+        return False  # it is none, and factor_terms() takes long to find that
     factors = [a for a in sp.Mul.make_args(sp.factor_terms(f)) if a.free_symbols & moving]
     powers = [a.as_base_exp()[1] for a in factors]
     return bool(powers) and all(p.is_number and p.is_positive and p > 1 for p in powers)
