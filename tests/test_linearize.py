@@ -9,6 +9,7 @@ from pathlib import Path
 import fmpy
 import numpy as np
 import pytest
+import whipple
 from conftest import MODELS
 from fmpy.fmi2 import FMU2Model
 from runs import unpacked
@@ -242,6 +243,27 @@ def top(A: float, C: float, arm: float, theta0: float, rate: float, spin: float)
             psi.diff(): spin / C - rate * math.cos(theta0),
         },
     )
+
+
+@pytest.mark.thorough
+def test_whipples_bicycle_weaves_and_capsizes(built):
+    """At 5 m/s the published eigenvalues of the benchmark, to its 14 digits or so; at rest, at 2 and at 8 m/s
+    those of its equations.  The other poles are zero: where it is, where it heads, how fast it rolls."""
+    fmu = built(whipple.bicycle())
+    for v in (5.0, 0.0, 2.0, 8.0):
+        found = linearize(fmu, start_values=whipple.speeds(v), outputs=[])
+        M, K0, K2, C = (np.array(getattr(whipple, n)) for n in ("M", "K0", "K2", "C"))
+        A = np.block(
+            [
+                [np.zeros((2, 2)), np.eye(2)],
+                [-np.linalg.solve(M, G * K0 + v**2 * K2), -v * np.linalg.solve(M, C)],
+            ]
+        )
+        is_close(found, np.linalg.eigvals(A), 1e-11)
+        assert (len(found.states), found.poles.zeros) == (10, 6)
+        if v == 5.0:
+            is_close(found, whipple.AT_5, 1e-12)
+            assert found.stability.startswith("stable")
 
 
 def test_a_pendulum_upside_down_falls(native_fmu):

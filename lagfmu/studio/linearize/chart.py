@@ -269,7 +269,7 @@ def _measured(ex: Exchange, N: Floats, q: Places) -> Floats:
     rest = N @ _kernel(N[q])
     if names.KINETIC not in ex.rules or rest.shape[1] != of_q.shape[1] or rest.shape[1] > MOST:
         return np.asarray(of_q)
-    M = _mass(ex, rest)
+    M = mass(ex, rest)
     try:
         L = np.linalg.cholesky(M)
     except np.linalg.LinAlgError:
@@ -283,7 +283,7 @@ def _range(rows: Floats) -> Floats:
     return np.asarray(Vt[: int((s > RANK * s.max(initial=0.0)).sum())].T)
 
 
-def _mass(ex: Exchange, basis: Floats) -> Floats:
+def mass(ex: Exchange, basis: Floats) -> Floats:
     """(k, k): M in a basis (n, k) of velocities, of the kinetic energy, which is quadratic in them."""
     x, k = ex.state(), basis.shape[1]
     M = np.zeros((k, k))

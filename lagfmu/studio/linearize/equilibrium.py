@@ -2,11 +2,13 @@
 
 At rest, v = 0 and q' = 0, the accelerations a of the coordinates z that are left free vanish:
 
-    da/dz dz = -a   (least squares; of all dz the least),   q <- s(q + T dz) ,   f(q) = 0 by Gauss and Newton
+    M da/dz dz = -M a   (least squares; of all dz the least) ,   q <- s(q + T dz) ,   f(q) = 0
 
-with contacts and frictions as they stand.  A step is as long as the accelerations go on linearly.  Where a
-has a part that no dz takes away, as at the level of a pendulum's pivot, or dz is long and against the forces,
-a step goes where these push: from far away what is found is rather stable, from near what is near.
+with M of these coordinates (forces, not accelerations, have no part along what is indifferent), f(q) = 0 by
+Gauss and Newton, contacts and frictions as they stand.  A step is as long as the accelerations go on
+linearly.  Where M a has a part that no dz takes away, as at the level of a pendulum's pivot, or dz is long
+and against the forces, a step goes where these push: from far away what is found is rather stable, from near
+what is near.
 """
 
 from __future__ import annotations
@@ -17,10 +19,10 @@ import numpy as np
 
 from ... import names
 from ...errors import SimulationError
-from .chart import Chart, Rows, chart
+from .chart import MOST, Chart, Rows, chart, mass
 from .exchange import Exchange, Floats
 
-ROUNDS, PUSHES = 100, 20  # of Newton's method; of steps along the forces
+ROUNDS, PUSHES = 150, 30  # of Newton's method; of steps along the forces
 NEARLY, GROWS, SHORTEST = (
     0.5,
     4.0,
@@ -30,7 +32,11 @@ PUSHED = 0.2  # part of a coordinate's size, along the forces
 FARTHEST = 0.4  # part of a coordinate's size, at first
 ARRIVED = 1e-13  # likewise
 SETTLED = 1e-6  # likewise: where it no longer gets closer
-UNMET = 1e-6  # part of the accelerations that no displacement takes away
+UNMET, LEFT = (
+    1e-6,
+    0.5,
+)  # part of the forces that no displacement takes away: none; one that is pushed along
+NO_FORCE = 1e-10  # of a size
 LATER = (0.37, 1.1)  # s: forces at rest are those of these times too
 
 
@@ -42,25 +48,32 @@ def find(ex: Exchange, rows: Rows, inputs: Sequence[str], t: float) -> Chart:
     x = np.where(ex.coordinate, ex.state(), 0.0)
     ex.put(x)
     _check_rest(ex, rows)
-    pushes, last, radius = 0, np.inf, FARTHEST
-    unheld = ""
+    pushes, unmets, last, radius, pushed = 0, 0, np.inf, FARTHEST, PUSHED
+    unheld, before = "", np.zeros(0)
     for _ in range(ROUNDS):
         now = chart(ex, rows, inputs)
         a = now.accelerations(ex)
-        dz, unmet = _step(ex, now, a)
+        dz, unmet = _step(ex, now, M := _inertia(ex, now), a)
         far, push = _far(ex, now, dz), now.along(a)
         against = far > FARTHEST and _along(ex, now, push, dz) < 0
-        if unmet or (against and pushes < PUSHES):
-            pushes, unheld = pushes + 1, unheld or _unheld(ex, now, a)
-            if pushes > PUSHES:
+        if unmet > LEFT or (against and pushes < PUSHES):
+            pushes, unmets = pushes + against, unmets + (unmet > LEFT)
+            unheld = unheld or _unheld(ex, now, a)
+            if unmets > PUSHES:
                 raise SimulationError(unheld)
-            _move(ex, rows, inputs, now, push * (PUSHED / max(_far(ex, now, push), 1e-300)))
+            way = now.T[:, : now.places] @ push
+            if len(before) and (way / ex.size) @ (before / ex.size) < 0:
+                pushed /= 2  # to and fro
+            before = way
+            _move(ex, rows, inputs, now, push * (pushed / max(_far(ex, now, push), 1e-300)))
             continue
         if far <= ARRIVED or (far < SETTLED and far >= last):
+            if unmet > UNMET:
+                raise SimulationError(_unheld(ex, now, a))
             _check_time(ex, t)
             return now
         last = far
-        radius = _trusted(ex, rows, inputs, now, dz, radius)
+        radius = _trusted(ex, rows, inputs, now, M, dz, radius)
     raise SimulationError(
         f"no equilibrium was found in {ROUNDS} steps of Newton's method from the start: start nearer to it "
         "(--set NAME=VALUE)"
@@ -80,24 +93,37 @@ def _along(ex: Exchange, now: Chart, one: Floats, other: Floats) -> float:
     return float((one / size) @ (other / size))
 
 
-def _step(ex: Exchange, now: Chart, a: Floats) -> tuple[Floats, bool]:
-    """dz of the coordinates, and whether a has a part that it does not take away."""
+def _inertia(ex: Exchange, now: Chart) -> Floats:
+    """Of the velocities of z, to make forces of accelerations; 1 where the FMU does not tell it."""
+    basis = now.T[:, now.places :]
+    if names.KINETIC not in ex.rules or basis.shape[1] > MOST:
+        return np.eye(basis.shape[1])
+    return mass(ex, basis)
+
+
+def _step(ex: Exchange, now: Chart, M: Floats, a: Floats) -> tuple[Floats, float]:
+    """dz of the coordinates, and the part of the forces M a that it does not take away."""
     if not len(a):
-        return np.zeros(now.places), False
+        return np.zeros(now.places), 0.0
     place = {n: k for k, n in enumerate(ex.states)}
     size = np.array([ex.size[place[n]] for n in now.names[: now.places]])
-    K = (now.E @ now.A)[now.places :, : now.places] * size
+    K, a = M @ (now.E @ now.A)[now.places :, : now.places] * size, M @ a
     weight = np.abs(K).max(axis=1, initial=0.0)
     weight = 1 / np.where(weight > 0, weight, max(float(weight.max(initial=0.0)), 1.0))
     dz, *_ = np.linalg.lstsq(weight[:, None] * K, -weight * a, rcond=1e-9)
     left = weight * (K @ dz + a)
     whole = float(np.abs(weight * a).max())
-    unmet = whole > 1e-10 and float(np.abs(left).max()) > UNMET * whole
-    return dz * size, unmet
+    return dz * size, float(np.abs(left).max()) / whole if whole > NO_FORCE else 0.0
 
 
 def _trusted(
-    ex: Exchange, rows: Rows, inputs: Sequence[str], now: Chart, dz: Floats, radius: float
+    ex: Exchange,
+    rows: Rows,
+    inputs: Sequence[str],
+    now: Chart,
+    M: Floats,
+    dz: Floats,
+    radius: float,
 ) -> float:
     """A step of at most `radius`, smaller until the next one of the same K is about what is left of this; the
     radius for the next."""
@@ -105,7 +131,7 @@ def _trusted(
     while True:
         part = min(1.0, radius / far)
         _move(ex, rows, inputs, now, part * dz)
-        left, _ = _step(ex, now, now.accelerations(ex))
+        left, _ = _step(ex, now, M, now.accelerations(ex))
         off = _far(ex, now, left - (1 - part) * dz) / (part * far)
         if off < NEARLY or radius < SHORTEST:
             return radius * (GROWS if part < 1 else 1.0)

@@ -130,6 +130,11 @@ def _check_fmu(path: Path) -> None:
             f"{str(path)!r} has no model exchange, whose functions a linearization calls: build it natively, "
             "without --error-bars and --sensitivities, or give the model file"
         )
+    if any(v.dimensions for v in description.modelVariables):
+        raise SimulationError(
+            f"{str(path)!r} tells its multipliers in arrays (--arrays), expected one by one: build it "
+            "without, or give the model file"
+        )
     states = [u.variable.derivative for u in description.derivatives]
     hidden = [v.name for v in states if v.causality == "local"]
     if hidden:

@@ -75,12 +75,13 @@ class Linearization:
         growth = float(values.real.max(initial=-np.inf))
         if growth > least:
             return f"unstable: grows by e in {1 / growth:.6g} s"
-        if len(self.poles.indifferent) > 1:
-            return "unstable to first order: displaced, it drifts on"
+        drifts = "; displaced, it drifts on" * (len(self.poles.indifferent) > 1)
+        if len(values) == 0 and drifts:
+            return drifts.removeprefix("; ")
         if growth > -least:
-            return "undamped: to first order neither stable nor unstable"
+            return f"undamped: to first order neither stable nor unstable{drifts}"
         if zeros:
-            return "stable, but for what is indifferent"
+            return f"stable, but for what is indifferent{drifts}"
         return "asymptotically stable" if len(values) else "nothing moves"
 
     def mode(self, k: int) -> dict[str, complex]:
