@@ -32,6 +32,7 @@ from rich.text import Text
 from lagfmu import LagfmuError, Verification, verify
 from lagfmu.api import package
 from lagfmu.cli.terminal import prepare_streams
+from lagfmu.files import write_whole
 from lagfmu.fmu.compiler import HOST
 from lagfmu.fmu.face import USUAL, Face
 from lagfmu.fmu.native import takes_long
@@ -254,7 +255,7 @@ def _write(path: Path, rows: Sequence[tuple[str, ...]]) -> None:
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(HEADINGS)
     writer.writerows(rows)
-    path.write_text(text.getvalue(), encoding="utf-8")
+    write_whole(path, text.getvalue().encode())
 
 
 if __name__ == "__main__":

@@ -2,13 +2,43 @@
 
 from __future__ import annotations
 
+import errno
+import re
 import tempfile
 from collections.abc import Sequence
 from typing import Any
 
+LONGEST, MOST = 400, 20_000  # letters that a message shows of one word, and in all
+WORD = re.compile(rf"\S{{{LONGEST + 1},}}|[ \t]{{{LONGEST + 1},}}")
+
 
 class LagfmuError(Exception):
-    """Base of every error that lagfmu raises on purpose."""
+    """Base of every error that lagfmu raises on purpose.
+
+    Its message shows the ends alone of what is longer than any name, which a file that others wrote may hold.
+    """
+
+    def __str__(self) -> str:
+        return shortened(super().__str__())
+
+
+def shortened(text: str) -> str:
+    """A message without the middle of words that are longer than any name."""
+    text = WORD.sub(lambda m: _ends(m[0], LONGEST), text)
+    return text if len(text) <= MOST else _ends(text, MOST)
+
+
+def _ends(text: str, most: int) -> str:
+    return f"{text[: most // 2]}...({len(text) - most} letters)...{text[-most // 2 :]}"
+
+
+def remedy_of(error: OSError) -> str:
+    """What helps against an error of the system; empty where that depends on what was done."""
+    if error.errno in (errno.EMFILE, errno.ENFILE):
+        return "close some, or allow more, as `ulimit -n 4096` does"
+    if error.errno in (errno.ENOMEM, errno.EAGAIN):
+        return "end other programs, or use fewer workers"
+    return ""
 
 
 class UsageError(LagfmuError):
@@ -54,6 +84,9 @@ class TableError(LagfmuError):
 class LagfmuWarning(UserWarning):
     """Something that is allowed, and may not be what was meant."""
 
+    def __str__(self) -> str:
+        return shortened(super().__str__())
+
 
 class UnitError(LagfmuError):
     """A unit that cannot be read, or is not coherent SI."""
@@ -72,10 +105,18 @@ class TemporaryFolderError(LagfmuError):
 
     def __init__(self, error: OSError, variable: str = "TMPDIR") -> None:
         where = error.filename or tempfile.gettempdir()
-        super().__init__(
-            f"{where}: {error.strerror or error}: is the disk full? The environment variable {variable} "
-            "chooses another folder for temporary files"
+        full = error.errno not in (
+            errno.ENOENT,
+            errno.EACCES,
+            errno.EPERM,
+            errno.EROFS,
+            errno.ENOTDIR,
         )
+        remedy = remedy_of(error) or (
+            f"{'is the disk full?' if full else 'it cannot be written to.'} The environment variable "
+            f"{variable} chooses another folder for temporary files"
+        )
+        super().__init__(f"{where}: {error.strerror or error}: {remedy}")
 
 
 class VerificationError(LagfmuError):

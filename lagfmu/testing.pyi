@@ -13,6 +13,7 @@ from .codegen.c.equations import model_source
 from .codegen.c.printer import HELPERS, identifiers, number, string
 from .codegen.c.solve import solve_source
 from .codegen.py.equations import lower
+from .files import write_whole
 from .fmu import archive, compiler, described
 from .fmu import target as targets
 from .fmu.archive import version as archive_version
@@ -99,6 +100,7 @@ from .studio.live.playable import playable, told_by
 from .studio.live.render import Playable, render
 from .studio.report import pdf as report_pdf
 from .studio.report.findings import obtained
+from .studio.report.study import study_in
 from .studio.sensitivity.local import sensitivity
 from .studio.sensitivity.ranges import over_ranges
 from .studio.stress import runs, worker
@@ -125,9 +127,10 @@ from .studio.stress.report import NO_WORRY, VERDICTS, WORRY, Stressed
 from .studio.stress.runs import departures, started
 from .studio.sweep import engine
 from .studio.sweep.design import axis, design, distribution, sampled
-from .studio.sweep.parts import PartWarning
+from .studio.sweep.design import from_file as rows_from
+from .studio.sweep.parts import Parts, PartWarning
 from .studio.sweep.process import SessionProcess
-from .studio.sweep.table import happened
+from .studio.sweep.table import happened, read_rows
 from .studio.tradeoff.choose import choose
 from .studio.tradeoff.held_out import other_values
 from .studio.tradeoff.measure import Plan as TradeoffPlan
@@ -145,4 +148,5 @@ from .verification.laws import CarriedLaws
 from .verification.plot import COLOURS, figure_of, moments, panels
 from .verification.reference import read_table
 from .verification.simulate import ErrorBarWarning
-from .verification.verify import RECORD
+from .verification.statements import read_statements
+from .verification.verify import RECORD, closed_forms_in, laws_in, left_out_in

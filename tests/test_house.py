@@ -22,6 +22,7 @@ ROOMS = (  # each imports from those before it, and from no other
     "errors",
     "names",
     "methods",
+    "files",
     "numeric",
     "solver",
     "model",
@@ -216,6 +217,26 @@ def test_only_the_fmi_layer_says_fmi() -> None:
     assert named
     for name in named:
         assert name.startswith(("fmu/", "runtime/fmi/fmi2", "runtime/fmi/fmi3")), name
+
+
+def test_one_door_writes_files() -> None:
+    """What a user keeps is written beside what was there, and takes its place when it is whole: elsewhere
+    files are written below temporary folders alone, and to packed archives in memory."""
+    writes = re.compile(
+        r"\.(write_text|write_bytes|savefig|to_csv|to_parquet|to_netcdf|to_zarr|savez|write_table|saving)\((?!FILE)"
+        r"|\bopen\([^)\n]*[\"'][wax]b?[\"']|\bshutil\.(copy\w*|move)\("
+    )
+    found = {p.relative_to(ROOT).as_posix() for p in MODULES if writes.search(p.read_text("utf-8"))}
+    beside = {  # what they hand to write_whole, or to a figure's picture in memory
+        *("files.py", "verification/figure.py", "studio/film.py", "studio/live/icon.py"),
+        *("studio/report/figures.py", "studio/sweep/parts.py", "studio/sweep/sweep.py"),
+        "studio/sweep/table.py",
+    }
+    temporary = {
+        *("fmu/compiler.py", "fmu/trial.py", "verification/simulate.py"),
+        *("studio/report/firefox.py", "studio/report/pdf.py"),
+    }
+    assert found <= beside | temporary, found - beside - temporary
 
 
 def test_one_loop_runs_an_fmu() -> None:

@@ -37,6 +37,9 @@ def read(path: Path) -> tuple[Any, str]:
     )
     if b"<!DOCTYPE" in content.replace(b"\0", b""):  # in UTF-16, too
         return None, doctype
+    if (count := content.count(b"<")) > 2 * MOST:
+        what = f"{name!r} has {count} tags, expected at most {2 * MOST}"
+        return None, f"{what}: leave out what is no mechanism"
     root, problem = _parsed(content.rstrip(b"\0\r\n\t "))
     if root is None:
         return None, f"{name!r} is no XML: {problem}: correct it there"

@@ -6,6 +6,7 @@ Constraints are rigid here.  The world is the ground, a body without joints a pa
 
 from __future__ import annotations
 
+import contextlib
 import os
 import warnings
 from collections import Counter
@@ -21,6 +22,7 @@ from numpy.typing import NDArray
 from sympy.physics.vector import dynamicsymbols
 
 from ..errors import LagfmuWarning, ModelError
+from ..files import foreign
 from ..model.elements import Input, Parameter
 from ..model.picture import Box, Rod, Shape, Sphere
 from ..names import RESERVED
@@ -43,6 +45,7 @@ NO_GRAVITY = 1 << 7  # mjtDisableBit
 # transmission joint or joint in parent, no dynamics, a fixed gain, no bias or an affine one
 BY_JOINT = {(transmission, 0, 0, bias) for transmission in (0, 1) for bias in (0, 1)}
 OPEN = 1e-2  # m or rad: what an equality may miss at the start, written with few digits, untold
+LARGEST = 1e60  # numbers of a compiled model: products of a few of them are finite
 SQUARE = 1e-9  # cosine of two axes that are square, and what two points may differ by, relative
 
 
@@ -87,12 +90,27 @@ def from_mjcf(
         raise ModelError(path.name, ["reading MJCF needs mujoco: pip install mujoco"]) from None
     if problems := problems_of_files(path):
         raise ModelError(path.name, problems)
-    try:
+    with (
+        _quiet(mujoco),
+        foreign(
+            lambda said: ModelError(path.name, [f"MuJoCo does not take it: {said}: correct that"])
+        ),
+    ):
         m = mujoco.MjModel.from_xml_path(str(path))
-    except ValueError as error:
-        text = " ".join(str(error).split())
-        raise ModelError(path.name, [f"MuJoCo does not take it: {text}: correct that"]) from None
+        if wrong := _not_computable(m):
+            raise ValueError(wrong)
     return _Reader(mujoco, m, path.stem, limits, key, actuators).parts()
+
+
+@contextlib.contextmanager
+def _quiet(mujoco: Any) -> Iterator[None]:
+    """Without MUJOCO_LOG.TXT, which its warnings would leave in the folder where one works."""
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda said: None)
+    try:
+        yield
+    finally:
+        mujoco.set_mju_user_warning(before)
 
 
 class _Reader:
@@ -107,7 +125,8 @@ class _Reader:
         self.taken: set[str] = {"ground"}
         self.data = mujoco.MjData(m)
         self.data.qpos[:] = m.qpos0
-        mujoco.mj_kinematics(m, self.data)
+        with _quiet(mujoco):
+            mujoco.mj_kinematics(m, self.data)
         self.called = letters(m.names[: m.names.index(b"\0")].decode() or stem)
         self.key = self._key(key)
         self.ground = Ground(shape=self._looks(self._with(0)) or None)
@@ -566,6 +585,19 @@ class _Reader:
                 LagfmuWarning,
                 stacklevel=4,
             )
+
+
+def _not_computable(m: Any) -> str:
+    """What is wrong with the numbers of a compiled model; empty if nothing is."""
+    for name in dir(m):
+        values = getattr(m, name)
+        numbers = isinstance(values, np.ndarray) and values.dtype.kind == "f"
+        if numbers and not (np.abs(values.astype(float)) < LARGEST).all():
+            return f"{name} holds what is no number below {LARGEST:g}"
+    lengths = np.linalg.norm(m.jnt_axis, axis=1)
+    if not (np.abs(lengths - 1) < SQUARE).all():
+        return f"joint {np.argmin(lengths)} has an axis of no finite length"
+    return ""
 
 
 def _square(axes: Array) -> Array:

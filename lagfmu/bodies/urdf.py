@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import LagfmuWarning, ModelError
+from ..files import foreign
 from ..model.picture import Box, Rod, Shape, Sphere
 from . import markup
 from .body import Body, Ground, Marker
@@ -107,14 +108,13 @@ def _read(path: Path) -> tuple[Any, str]:
     if problems := problems_of_text(path.name, root):
         raise ModelError(path.name, problems)
     left = left_out(root)
-    try:
+    with foreign(
+        lambda said: ModelError(
+            path.name, [f"{str(path)!r} is no URDF file that yourdfpy reads: {said}: correct it"]
+        )
+    ):
         file = BytesIO(needed(root))
         return URDF.load(file, build_scene_graph=False, load_meshes=False).robot, left
-    except Exception as error:
-        problem = (
-            f"{str(path)!r} is no URDF file that yourdfpy reads: {' '.join(str(error).split())}"
-        )
-        raise ModelError(path.name, [problem]) from None
 
 
 def _root(robot: Any) -> str:

@@ -8,7 +8,7 @@ from pathlib import Path
 import typer
 from rich.markup import escape
 
-from ..fmu.write import write_whole
+from ..files import write_whole
 from ..page.table import new_table, print_whole
 from ..verification.check import Verification
 from ..verification.junit import Report, as_json, as_junit, exit_code

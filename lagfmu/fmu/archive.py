@@ -19,6 +19,7 @@ from pathlib import Path
 from ..errors import TemporaryFolderError, VerificationError
 
 LARGEST = 1 << 31  # bytes of all files of an FMU, unpacked
+LARGEST_TEXT = 64_000_000  # bytes of a file that is read as a whole
 MOST = 100_000  # files
 SHOWN = 3  # problems in a message
 LEVEL = 9  # of zlib: as small as can be
@@ -70,6 +71,16 @@ def opened(fmu: Path) -> Iterator[zipfile.ZipFile]:
         raise VerificationError(
             f"{str(fmu)!r} is no FMU or damaged, expected a zip archive with modelDescription.xml ({error})"
         ) from None
+
+
+def entry(archive: zipfile.ZipFile, name: str) -> bytes:
+    """A file of an archive that is a text.  Raises VerificationError for one that is too large to be read."""
+    if (size := archive.getinfo(name).file_size) > LARGEST_TEXT:
+        raise VerificationError(
+            f"{str(archive.filename)!r}: its file {name!r} has {size} bytes, expected at most "
+            f"{LARGEST_TEXT}: build the FMU anew"
+        )
+    return archive.read(name)
 
 
 def _problems(files: list[zipfile.ZipInfo]) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import difflib
 import json
 import warnings
@@ -13,6 +14,7 @@ import sympy as sp
 
 from .. import names
 from ..errors import ModelError, TableError, VerificationError
+from ..files import foreign, json_of
 from ..interface.variables import VariableTable
 from ..model.closed_form import ClosedForm, Conserved, in_variables, output
 from ..model.elements import Expr
@@ -202,19 +204,17 @@ def pack_closed_forms(
 
 def left_out_of(content: bytes) -> int:
     """How many closed forms the scene leaves out, of a file that unpack_closed_forms() reads."""
-    return int(json.loads(content).get("left_out", 0))
+    return int(json_of(content).get("left_out", 0))
 
 
 def unpack_laws(content: bytes, name: str) -> Laws | None:
     """The laws of bodies in an FMU, which unpack_closed_forms() reads; None without any.  Raises as that."""
-    data = json.loads(content)
-    if LAWS not in data:
-        return None
-    try:
+    with _read(name):
+        data = json_of(content)
+        if LAWS not in data:
+            return None
         tables = functions_of([_spline(entry) for entry in data.get("tables", [])])
         return read_laws(data[LAWS], tables)
-    except (ValueError, RecursionError) as error:
-        raise _unreadable(name, error) from None
 
 
 def unpack_closed_forms(content: bytes, name: str) -> list[CarriedForm]:
@@ -222,10 +222,10 @@ def unpack_closed_forms(content: bytes, name: str) -> list[CarriedForm]:
 
     Raises VerificationError if the file is not lagfmu's.
     """
-    try:
+    with _read(name):
         if len(content) > LARGEST_RECORD:
             raise ValueError(f"{len(content)} bytes, expected at most {LARGEST_RECORD}")
-        data = json.loads(content)
+        data = json_of(content)
         if not isinstance(data, dict) or data.get("format") != FORMAT:
             raise ValueError(f"expected format {FORMAT}")
         for what, field in (("closed forms", "closed_forms"), ("tables", "tables")):
@@ -235,14 +235,14 @@ def unpack_closed_forms(content: bytes, name: str) -> list[CarriedForm]:
             raise ValueError("expected a number of closed forms that are left out")
         functions = functions_of([_spline(entry) for entry in data.get("tables", [])])
         return [_form(entry, functions) for entry in data["closed_forms"]]
-    except (ValueError, RecursionError) as error:
-        raise _unreadable(name, error) from None
 
 
-def _unreadable(name: str, error: Exception) -> VerificationError:
-    return VerificationError(
-        f"{name!r}: resources/lagfmu.json cannot be read ({error}); rebuild the FMU with this "
-        "version of lagfmu"
+def _read(name: str) -> contextlib.AbstractContextManager[None]:
+    return foreign(
+        lambda said: VerificationError(
+            f"{name!r}: resources/lagfmu.json cannot be read ({said}); rebuild the FMU with this version of "
+            "lagfmu"
+        )
     )
 
 

@@ -6,6 +6,7 @@ cache, where its name tells what it was made of, and linked from there.
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import errno
 import hashlib
@@ -235,8 +236,12 @@ def _objects(compiler: Compiler, target: str, runtime: Mapping[str, bytes]) -> d
     wanted = [file for file in places if file not in objects]
     if not wanted:
         return objects
-    _cache().mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix=".lagfmu_", dir=str(_cache())) as folder:
+    try:
+        _cache().mkdir(parents=True, exist_ok=True)
+        room = tempfile.TemporaryDirectory(prefix=".lagfmu_", dir=str(_cache()))
+    except OSError as error:
+        raise TemporaryFolderError(error, CACHE) from None
+    with room as folder:
         for file, content in runtime.items():
             Path(folder, file).write_bytes(content)
         for file in wanted:
@@ -288,7 +293,26 @@ def _cache() -> Path:
         return Path(os.environ[CACHE])
     if sys.platform == "win32" and "LOCALAPPDATA" in os.environ:
         return Path(os.environ["LOCALAPPDATA"], "lagfmu")
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache", "lagfmu")
+    try:
+        return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache", "lagfmu")
+    except RuntimeError:  # nobody's home
+        return _lent()
+
+
+@cache
+def _lent() -> Path:
+    """A folder of this process's own, that goes with it."""
+    folder = Path(tempfile.mkdtemp(prefix="lagfmu_"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return folder
+
+
+def _surroundings() -> dict[str, str]:
+    """The environment of the compiler: without a home zig does not know where to keep what it makes."""
+    found = dict(os.environ)
+    if not found.get("HOME") and not found.get("XDG_CACHE_HOME"):
+        found.setdefault("ZIG_GLOBAL_CACHE_DIR", str(_cache() / "zig"))
+    return found
 
 
 def _suffix(target: str) -> str:
@@ -329,12 +353,20 @@ def _run(compiler: Compiler, target: str, arguments: Sequence[str], folder: str)
     command += arguments
     try:
         run = subprocess.run(
-            command, cwd=folder, capture_output=True, text=True, check=False, timeout=TIMEOUT
+            command,
+            cwd=folder,
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=TIMEOUT,
+            env=_surroundings(),
         )
     except (OSError, subprocess.TimeoutExpired) as error:
         raise BuildError(f"the C compiler {compiler.command[0]} cannot run: {error}") from None
     if run.returncode != 0:
         place = Path(folder).parent
+        if "FdQuotaExceeded" in run.stderr or "Too many open files" in run.stderr:
+            raise TemporaryFolderError(OSError(errno.EMFILE, os.strerror(errno.EMFILE), str(place)))
         if "No space left" in run.stderr or shutil.disk_usage(place).free < LITTLE:
             full = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(place))
             raise TemporaryFolderError(full, CACHE if place == _cache() else "TMPDIR")

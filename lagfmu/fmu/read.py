@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 
 from .. import names
 from ..errors import SimulationError, VerificationError
+from ..files import content_of, foreign, xml_of
 from ..model.rule import Rule
 from ..numeric.tolerance import DEFAULT_TOLERANCE
-from .archive import opened, platforms
+from .archive import LARGEST_TEXT, entry, opened, platforms
 from .target import NATIVE, PYTHON
 
 PLATFORMS = {"2": fmpy.platform, "3": fmpy.platform_tuple}  # of this machine, by version of FMI
@@ -141,19 +142,22 @@ def read_description(path: Path) -> Any:
 
     Raises VerificationError if the file is missing, damaged or no FMU.
     """
-    if not path.is_dir():
-        with opened(path) as archive:
-            if "modelDescription.xml" not in archive.namelist():
-                raise VerificationError(
-                    f"{str(path)!r} is no FMU: it holds no modelDescription.xml"
-                )
-            archive.read("modelDescription.xml")  # whole, which zipfile tells
-    try:
+    with foreign(
+        lambda said: VerificationError(
+            f"{str(path)!r}: modelDescription.xml cannot be read ({said}): correct it, or build the FMU anew"
+        )
+    ):
+        if path.is_dir():
+            content = content_of(path / "modelDescription.xml", LARGEST_TEXT)
+        else:
+            with opened(path) as archive:
+                if "modelDescription.xml" not in archive.namelist():
+                    raise VerificationError(
+                        f"{str(path)!r} is no FMU: it holds no modelDescription.xml: build the FMU anew"
+                    )
+                content = entry(archive, "modelDescription.xml")
+        xml_of(content)
         found = fmpy.read_model_description(str(path), validate=False)
-    except Exception as error:
-        raise VerificationError(
-            f"{str(path)!r}: modelDescription.xml cannot be read ({error}): correct it, or build the FMU anew"
-        ) from None
     if problems := [*_of_experiment(found.defaultExperiment), *_of_variables(found)]:
         more = f"; and {len(problems) - SHOWN} more" if len(problems) > SHOWN else ""
         raise VerificationError(

@@ -6,7 +6,6 @@ import contextlib
 import importlib.metadata
 import logging
 import os
-import stat
 import tempfile
 import zipfile
 from collections.abc import Iterator, Mapping, Sequence
@@ -18,6 +17,7 @@ import numpy as np
 
 from .. import names
 from ..errors import BuildError, DerivationError, ModelError, RequestError
+from ..files import write_whole
 from ..interface.further import with_further
 from ..model.closed_form import ClosedForm, Conserved
 from ..model.file import fmu_at, in_scene
@@ -226,35 +226,3 @@ def _energy(prepared: Prepared) -> float:
     M, *_ = system.assemble_sparse(0.0, begun.q, begun.v, [*u, *begun.switch_states], p)
     speeds = np.maximum(begun.span * begun.rate, np.abs(begun.v))
     return float(M.diagonal() @ speeds**2 / 2)
-
-
-def write_whole(path: Path, content: bytes) -> None:
-    """Write a file at once, or leave what was there.  Raises BuildError with the cause."""
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    except OSError as error:
-        raise _unwritable(path, error) from None
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(content)
-        os.chmod(name, _mode(path))
-        os.replace(name, path)
-    except OSError as error:
-        Path(name).unlink(missing_ok=True)
-        raise _unwritable(path, error) from None
-
-
-def _mode(path: Path) -> int:
-    """That of the file which is replaced, else what the umask leaves of a new one."""
-    try:
-        return stat.S_IMODE(path.stat().st_mode)
-    except OSError:
-        mask = os.umask(0o077)  # it can be read by setting it only
-        os.umask(mask)
-        return 0o666 & ~mask
-
-
-def _unwritable(path: Path, error: OSError) -> BuildError:
-    remedy = "a folder of that name is there" if path.is_dir() else "choose another output folder"
-    return BuildError(f"cannot write {str(path)!r} ({error.strerror or error}): {remedy}")

@@ -7,7 +7,8 @@ import os
 from importlib.resources import files
 from pathlib import Path
 
-from ..errors import LagfmuError, UsageError
+from ..errors import UsageError
+from ..files import write_whole
 
 TEMPLATE = '''"""A bead on a parabola z = k x^2.  Change it into your own system, then:
 
@@ -101,9 +102,5 @@ def new(path: Path, source: str | None = None) -> Path:
         name = "".join(w[:1].upper() + w[1:] for w in words)
         name = name if name[:1].isalpha() else f"Model{name}"
         text = TEMPLATE.format(file=path.name, name=name)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise LagfmuError(f"cannot write {str(path)!r}: {error.strerror or error}") from None
+    write_whole(path, text.encode())
     return path

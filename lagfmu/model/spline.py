@@ -10,7 +10,6 @@ the knots and evaluates a polynomial (numeric/cubic.py).
 
 from __future__ import annotations
 
-import csv
 import math
 import os
 import warnings
@@ -23,10 +22,12 @@ import numpy as np
 import sympy as sp
 
 from ..errors import LagfmuWarning, TableError, UnitError
+from ..files import content_of, csv_of, foreign
 from ..numeric.cubic import Cubic
 from .elements import NAME, Expr
 from .units import DisplayUnit, parse_scaled
 
+LARGEST = 20_000_000  # bytes of a file
 FEWEST = {"natural": 2, "clamped": 2, "not-a-knot": 4, "periodic": 3}
 HIGHEST = 3  # order of the derivative that is constant between knots
 
@@ -87,7 +88,11 @@ class Spline:
         self.name, self.ends = name, ends
         self.x, self.y = (tuple(map(u.to_si, z)) for u, z in zip(units, (xs, ys), strict=True))
         self.x_unit, self.y_unit = (u.unit for u in units)
-        self.table = _table(self.x, self.y, ends)
+        try:
+            self.table = _table(self.x, self.y, ends)
+        except ValueError:
+            far = "its points are too far apart, or too near, for double precision: correct them"
+            raise TableError(name, [far]) from None
         self._functions: dict[int, Any] = {}
         if ends in ("clamped", "not-a-knot"):
             warnings.warn(
@@ -112,11 +117,12 @@ class Spline:
         It is read now, when the model is made: the FMU holds the numbers.  Raises TableError.
         """
         file = Path(path)
-        try:
-            rows = [r for r in csv.reader(file.read_text(encoding="utf-8-sig").splitlines()) if r]
-        except (OSError, UnicodeDecodeError, csv.Error) as error:
-            cause = getattr(error, "strerror", None) or error
-            raise TableError(name, [f"{str(file)!r} cannot be read ({cause})"]) from None
+        with foreign(
+            lambda said: TableError(
+                name, [f"{str(file)!r} cannot be read ({said}): expected rows of numbers"]
+            )
+        ):
+            rows = list(csv_of(content_of(file, LARGEST)))
         problems: list[str] = []
         head = rows[0] if rows and not _is_number(rows[0][0]) else []
         places = [_column(c, head, rows, problems) for c in columns]
@@ -125,7 +131,9 @@ class Spline:
             for place, values in zip(places if not problems else (), found, strict=False):
                 text = row[place].strip() if place < len(row) else ""
                 if not _is_number(text):
-                    problems.append(f"{str(file)!r}, row {count}: {text!r} is no number")
+                    problems.append(
+                        f"{str(file)!r}, row {count}: {text!r} is no number: correct it, or leave the row out"
+                    )
                 values.append(text)
         if problems:
             raise TableError(name, problems)
@@ -167,7 +175,10 @@ def splines_in(expressions: Iterable[Expr]) -> list[Spline]:
 def _table(x: Sequence[float], y: Sequence[float], ends: str) -> Cubic:
     from scipy.interpolate import CubicSpline
 
-    spline = CubicSpline(x, y, bc_type=ends)
+    with np.errstate(all="ignore"):
+        spline = CubicSpline(x, y, bc_type=ends)
+    if not np.isfinite(spline.c).all():
+        raise ValueError
     rows = [tuple(float(c) for c in row[::-1]) for row in spline.c.T]
     rows.append((float(y[-1]), float(spline(x[-1], 1)), 0.0, 0.0))
     return Cubic(x, rows, ends == "periodic")

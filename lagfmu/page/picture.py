@@ -12,6 +12,7 @@ from typing import Any
 import sympy as sp
 
 from ..errors import BuildError, ModelError
+from ..files import foreign, json_of
 from ..model.closed_form import in_variables
 from ..model.elements import TIME, Expr
 from ..model.model import Model, Nonholonomic
@@ -165,17 +166,14 @@ def as_bytes(picture: Mapping[str, Any]) -> bytes:
 
 def read_picture(text: bytes) -> dict[str, Any]:
     """The picture in an FMU.  Raises BuildError for what is none: an FMU may come from anywhere."""
-    try:
-        found = json.loads(text)
+    with foreign(
+        lambda said: BuildError(f"{IN_FMU} is no picture of lagfmu's ({said}): build the FMU anew")
+    ):
+        found = json_of(text)
         shapes = [_checked_shape(s) for s in found["shapes"]]
         if found["dimensions"] not in (2, 3):
             raise ValueError(f"dimensions = {found['dimensions']!r}")
         return {"dimensions": found["dimensions"], "shapes": shapes}
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
-        raise BuildError(
-            f"resources/picture.json is no picture of lagfmu's ({type(error).__name__}: {error}): "
-            "build the FMU anew"
-        ) from None
 
 
 def _checked_shape(shape: Mapping[str, Any]) -> dict[str, Any]:

@@ -9,6 +9,7 @@ import math
 from typing import Any
 
 from ..errors import BuildError, ModelError
+from ..files import foreign, json_of
 from ..interface.table import variable_table
 from ..mechanics.form import Form
 from ..model.page import told
@@ -56,15 +57,13 @@ def as_bytes(preset: Preset) -> bytes:
 
 def read_preset(text: bytes) -> Preset:
     """The preset in an FMU.  Raises BuildError for what is none: an FMU may come from anywhere."""
-    try:
-        found = json.loads(text)
+    with foreign(
+        lambda said: BuildError(f"{IN_FMU} is no page of lagfmu's ({said}): build the FMU anew")
+    ):
+        found = json_of(text)
         ranges = {str(n): _ends(ends) for n, ends in dict(found["ranges"]).items()}
         lists = {what: [str(n) for n in list(found[what])] for what in ("sliders", "curves")}
         return {**lists, "ranges": ranges}
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
-        raise BuildError(
-            f"{IN_FMU} is no page of lagfmu's ({type(error).__name__}: {error}): build the FMU anew"
-        ) from None
 
 
 def _ends(ends: Any) -> list[float]:

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from ..errors import BuildError, UsageError
+from ..files import write_whole
 from ..fmu.read import Trajectory
-from ..fmu.write import write_whole
 from .live.playable import Told
 from .live.recording import recorded
 from .live.render import render
@@ -83,11 +83,11 @@ def _draw(
     note = "" if abs(speed - 1) < 0.05 or not title else f", {speed:.3g} times as fast"
     head = figure.text(0.02, 0.985, "", fontsize=11, color=INK, va="top")
     frames = _writer(out, rate)
-    try:
-        out.parent.mkdir(parents=True, exist_ok=True)
+
+    def film(place: Path) -> None:
         with (
             matplotlib.rc_context({"savefig.facecolor": "white"}),
-            frames.saving(figure, str(out), dpi=100),
+            frames.saving(figure, str(place), dpi=100),
         ):
             for k, t in enumerate(times):
                 stage.draw(axes, k)
@@ -98,8 +98,8 @@ def _draw(
                     marks[0].set_data([t], [value])
                     marks[1].set_text(f"{curve['name']} = {value:.4g} {curve['unit']}")
                 frames.grab_frame()
-    except OSError as error:
-        raise BuildError(f"cannot write the film {str(out)!r}: {error}") from None
+
+    write_whole(out, film)
 
 
 def _panels(

@@ -17,8 +17,9 @@ from xml.etree import ElementTree as ET
 
 from .. import names
 from ..errors import SimulationError
+from ..files import write_whole
 from ..fmu.read import Trajectory, communication_points, experiment_of, read_description
-from ..fmu.write import REFERENCES, write_whole
+from ..fmu.write import REFERENCES
 from .check import Verification
 from .junit import as_json
 from .report import report

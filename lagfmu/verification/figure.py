@@ -10,7 +10,7 @@ import matplotlib
 from matplotlib.figure import Figure
 
 from ..errors import UsageError
-from ..fmu.write import write_whole
+from ..files import write_whole
 
 STYLE: dict[str, Any] = {
     "axes.spines.top": False,

@@ -6,10 +6,11 @@ reference.  Between communication points a Real is interpolated linearly, what i
 
 from __future__ import annotations
 
-import csv
+import math
 import os
+from array import array
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -17,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SettingError
+from ..files import content_of, csv_of, foreign
 from ..fmu.read import Trajectory
 from .check import Check, Missed
 
@@ -25,6 +27,7 @@ REMEDY = (
     "expected commas between columns and points in numbers, 0.5: save it so, or in pandas "
     "read_csv(FILE, sep=';', decimal=',').to_csv(FILE, index=False)"
 )
+LARGEST = 100_000_000  # bytes of a table
 TRUTH = {"True": 1.0, "False": 0.0, "true": 1.0, "false": 0.0}
 
 
@@ -98,56 +101,75 @@ def driven(inputs: Driven | None) -> Trajectory | None:
 def read_table(path: Path, gaps: bool = False) -> Trajectory:
     """A CSV file with a column `time` [s]; with `gaps` an empty cell is NaN.  Raises SettingError with what
     is wrong with it."""
-    try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            head, *rows = [row for row in csv.reader(file, skipinitialspace=True) if row]
-    except OSError as error:
-        raise SettingError(f"{str(path)!r} cannot be read: {error.strerror or error}") from None
-    except (ValueError, csv.Error):
-        raise SettingError(
-            f"{str(path)!r} is no table: expected names, and rows of numbers"
-        ) from None
-    names = [n.strip() for n in head]
-    if len(names) == 1 and ";" in names[0]:
-        raise SettingError(f"{str(path)!r} separates its columns by semicolons: {REMEDY}")
-    if rows and all(len(row) == 2 * len(names) for row in rows):
-        raise SettingError(f"{str(path)!r} has decimal commas: {REMEDY}")
-    if twice := sorted(n for n, count in Counter(names).items() if count > 1 and n):
-        raise SettingError(f"{str(path)!r}: {', '.join(twice)} stands in two columns")
-    if "" in names:  # NumPy would call it f0, f1, ...
-        raise SettingError(
-            f"{str(path)!r}: column {names.index('') + 1} has no heading: give it one, or remove the column"
+    with foreign(
+        lambda said: SettingError(
+            f"{str(path)!r} is no table ({said}): expected names, and rows of numbers"
         )
-    table = np.zeros(len(rows), dtype=[(n, float) for n in names])
-    bad: list[str] = []
-    for k, row in enumerate(rows):
-        try:
-            for name, cell in zip(names, row, strict=True):
-                if gaps and not cell.strip():
-                    table[name][k] = np.nan
-                elif not np.isfinite(number := float(TRUTH.get(cell.strip(), cell))):
-                    bad.append(f"{name} in row {k + 1} is {cell.strip()!r}")
-                else:
-                    table[name][k] = number
-        except ValueError:
-            raise SettingError(
-                f"{str(path)!r} is no table of numbers: row {k + 1} is {','.join(row)!r}"
-                + (f": {REMEDY}" if len(row) > len(names) else "")
-            ) from None
+    ):
+        rows = csv_of(content_of(path, LARGEST))
+        names = [n.strip() for n in next(rows, [])]
+        _check_names(path, names)
+        cells, bad = _cells(path, names, rows, gaps)
+    table = np.zeros(len(cells), dtype=[(n, float) for n in names])
+    for k, name in enumerate(names):
+        table[name] = cells[:, k]
     if bad:
         more = f", and {len(bad) - 5} more" if len(bad) > 5 else ""
         raise SettingError(
             f"{str(path)!r}: {', '.join(bad[:5])}{more}: expected finite numbers"
             + (", or empty cells" if gaps else "")
         )
-    if not rows:
-        raise SettingError(f"{str(path)!r} has no rows")
+    if not len(table):
+        raise SettingError(f"{str(path)!r} has no rows: expected names, and rows of numbers")
     if gaps:
         return table  # what its columns are is not yet known
     if "time" not in names:
         raise SettingError(
-            f"{str(path)!r}: there is no column 'time', found {', '.join(names) or 'nothing'}"
+            f"{str(path)!r}: there is no column 'time', found {', '.join(names)}: rename that of the times"
         )
     if not (np.diff(table["time"]) >= 0).all():
         raise SettingError(f"{str(path)!r}: the times are not sorted, expected rising seconds")
     return table
+
+
+def _check_names(path: Path, names: Sequence[str]) -> None:
+    """Raises SettingError for headings that are none."""
+    if len(names) == 1 and ";" in names[0]:
+        raise SettingError(f"{str(path)!r} separates its columns by semicolons: {REMEDY}")
+    if twice := sorted(n for n, count in Counter(names).items() if count > 1 and n):
+        raise SettingError(
+            f"{str(path)!r}: {', '.join(twice)} stands in two columns: remove one, or rename it"
+        )
+    if not names:
+        raise SettingError(
+            f"{str(path)!r} is no table: it is empty, expected names, and rows of numbers"
+        )
+    if "" in names:  # NumPy would call it f0, f1, ...
+        raise SettingError(
+            f"{str(path)!r}: column {names.index('') + 1} has no heading: give it one, or remove the column"
+        )
+
+
+def _cells(
+    path: Path, names: Sequence[str], rows: Iterator[Sequence[str]], gaps: bool
+) -> tuple[NDArray[np.float64], list[str]]:
+    """The numbers (rows, names), and those that are not finite, in words.  Raises SettingError."""
+    found, bad = array("d"), list[str]()
+    for k, row in enumerate(rows, 1):
+        if len(row) == 2 * len(names):
+            raise SettingError(f"{str(path)!r} has decimal commas: {REMEDY}")
+        try:
+            for name, cell in zip(names, row, strict=True):
+                text = cell.strip()
+                number = np.nan if gaps and not text else float(TRUTH.get(text, text))
+                if not math.isfinite(number) and text:
+                    bad.append(f"{name} in row {k} is {text!r}")
+                found.append(number)
+        except ValueError:
+            remedy = (
+                REMEDY if len(row) > len(names) else f"expected {len(names)} numbers: correct it"
+            )
+            raise SettingError(
+                f"{str(path)!r} is no table of numbers: row {k} is {','.join(row)!r}: {remedy}"
+            ) from None
+    return np.array(found).reshape(-1, len(names)), bad

@@ -9,17 +9,17 @@ Formulas are read as text that is never run (model/named.py); what comes of a st
 
 from __future__ import annotations
 
-import tomllib
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import sympy as sp
 
 from .. import names
 from ..errors import SettingError
+from ..files import content_of, foreign, toml_of
 from ..fmu.read import numbers_of
 from ..model.closed_form import output
 from ..model.elements import Expr
@@ -32,6 +32,7 @@ from .reference import Reference, read_table
 WITHIN = 1e-6  # relative error that is allowed where nothing is said
 DIRECTIONS = {"rising": 1.0, "falling": -1.0}
 LARGEST = 1_000_000  # bytes of a file
+LONGEST = 200  # letters of the name of one
 
 
 @dataclass(frozen=True)
@@ -95,22 +96,17 @@ def read_statements(path: Path, description: Any) -> list[Against]:
     if not problems and not found:
         problems.append("it says nothing, expected tables such as [[bounds]]")
     if problems:
-        raise SettingError(f"{str(path)!r}: " + "; ".join(problems))
+        raise SettingError(f"{str(path)!r}: {'; '.join(problems)}: correct it there")
     return found
 
 
 def _read(path: Path) -> dict[str, Any]:
-    try:
-        content = path.read_bytes()
-        if len(content) > LARGEST:
-            raise SettingError(
-                f"{str(path)!r} has {len(content)} bytes, expected at most {LARGEST}"
-            )
-        return tomllib.loads(content.decode("utf-8"))
-    except OSError as error:
-        raise SettingError(f"{str(path)!r} cannot be read: {error.strerror or error}") from None
-    except (ValueError, RecursionError) as error:
-        raise SettingError(f"{str(path)!r} is no TOML: {error}") from None
+    with foreign(
+        lambda said: SettingError(f"{str(path)!r} cannot be read ({said}): correct the path")
+    ):
+        content = content_of(path, LARGEST)
+    with foreign(lambda said: SettingError(f"{str(path)!r} is no TOML: {said}: correct it there")):
+        return toml_of(content)
 
 
 def _known(description: Any) -> dict[str, Expr]:
@@ -183,6 +179,8 @@ def _within(folder: Path, file: str) -> Path:
     if "\0" in file:
         raise ValueError(f"file = {file!r}, expected the name of a CSV file")
     found = folder / file
+    if len(file) > LONGEST:
+        raise ValueError(f"file = {file!r}, expected a name of at most {LONGEST} letters")
     if not found.resolve().is_relative_to(folder.resolve()):
         raise ValueError(
             f"file = {file!r} stands outside the folder of the statements: put the table beside them"
@@ -193,4 +191,4 @@ def _within(folder: Path, file: str) -> Path:
 
 
 def _is_number(value: Any) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and np.isfinite(value)
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)

@@ -23,7 +23,7 @@ from ..fmu.closed_forms import (
     unpack_closed_forms,
     unpack_laws,
 )
-from ..fmu.read import Trajectory, experiment_of, kind_of, numbers_of, read_description
+from ..fmu.read import SHOWN, Trajectory, experiment_of, kind_of, numbers_of, read_description
 from ..fmu.write import as_fmu
 from ..model.closed_form import ClosedForm, Conserved
 from ..model.model import Model
@@ -207,7 +207,10 @@ def closed_forms_in(path: Path) -> list[CarriedForm]:
                     f"closed form {closed_form.name!r} uses {name!r}, which is a {kind_of(v)}"
                 )
     if problems:
-        raise VerificationError(f"{str(path)!r}: " + "; ".join(problems))
+        more = f"; and {len(problems) - SHOWN} more" if len(problems) > SHOWN else ""
+        raise VerificationError(
+            f"{str(path)!r}: {'; '.join(problems[:SHOWN])}{more}: build the FMU anew"
+        )
     return closed_forms
 
 

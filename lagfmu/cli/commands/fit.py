@@ -55,8 +55,9 @@ def fit(
 
     Exit code 1 if the search does not converge.
     """
+    from ...files import write_whole
     from ...fmu.read import read_description, units_of
-    from ...fmu.write import as_fmu, write_whole
+    from ...fmu.write import as_fmu
     from ...page.table import print_whole
     from ...studio.fit.problem import bounds_of, derivatives_of, deviation_of, named
     from ...studio.fit.solve import TOLERANCE

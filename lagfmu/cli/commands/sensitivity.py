@@ -54,8 +54,8 @@ def sensitivity(
     figure: options.Plot = None,
 ) -> None:
     """How outputs change with parameters: derivatives at the given values, or indices over ranges."""
+    from ...files import write_whole
     from ...fmu.read import read_description, units_of
-    from ...fmu.write import write_whole
     from ...model.selection import listed
     from ...page.table import print_whole
     from ...studio.sensitivity.local import ALL, TOLERANCE, made_for

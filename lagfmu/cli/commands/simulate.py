@@ -131,7 +131,7 @@ def _print_last(result: Result, names: Sequence[str] = ()) -> None:
 
 def _save(path: Path, result: Any) -> None:
     """All columns; names are quoted, because that of an acceleration holds a comma."""
-    from ...fmu.write import write_whole
+    from ...files import write_whole
     from ...verification.crosscheck import as_csv
 
     write_whole(path, as_csv(result, [n for n in result.dtype.names if n != "time"]).encode())

@@ -50,7 +50,7 @@ def verify(
 
     The exit code is the largest of all FMUs'.
     """
-    from ...fmu.write import write_whole
+    from ...files import write_whole
     from ...verification.junit import refused
     from ...verification.reference import Reference, read_table
     from ...verification.report import report

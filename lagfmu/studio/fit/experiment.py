@@ -79,7 +79,10 @@ def series_of(
     if columns is None:
         return None
     if "time" not in columns:
-        problems.append(f"{what}there is no column 'time', found {', '.join(columns) or 'nothing'}")
+        problems.append(
+            f"{what}there is no column 'time', found {', '.join(columns) or 'nothing'}: rename that of the "
+            "times"
+        )
         return None
     time = columns.pop("time")
     if not (np.isfinite(time).all() and len(time) and (np.diff(time) >= 0).all()):

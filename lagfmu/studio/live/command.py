@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
 
-from ...fmu.write import write_whole
+from ...files import write_whole
 from ...model.file import fmu_at, in_scene
 from ...model.model import Model
 from ...model.scene import Scene

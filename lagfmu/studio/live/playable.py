@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import BuildError
-from ...fmu.archive import opened
+from ...fmu.archive import entry, opened
 from ...fmu.bundle import unbundled
 from ...fmu.native import GENERATED, IDENTITY, sources_of
 from ...fmu.read import read_description
@@ -77,13 +77,13 @@ def _told_by_fmu(path: Path) -> Told:
     with opened(path) as archive:
         names = archive.namelist()
         carried = {
-            Path(n).name: archive.read(n)
+            Path(n).name: entry(archive, n)
             for n in names
             if n.startswith("sources/") and n.endswith((".c", ".h"))
         }
-        page = archive.read(PAGE) if PAGE in names else b""
-        picture = read_picture(archive.read(IN_FMU)) if IN_FMU in names else None
+        page = entry(archive, PAGE) if PAGE in names else b""
+        picture = read_picture(entry(archive, IN_FMU)) if IN_FMU in names else None
         own = presets.IN_FMU
-        preset = presets.read_preset(archive.read(own)) if own in names else None
-        description = archive.read("modelDescription.xml")
+        preset = presets.read_preset(entry(archive, own)) if own in names else None
+        description = entry(archive, "modelDescription.xml")
         return Told(description, equations_of(page), picture, preset, unbundled(carried))

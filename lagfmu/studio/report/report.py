@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import UsageError
-from ...fmu.write import as_fmu, write_whole
+from ...files import write_whole
+from ...fmu.write import as_fmu
 from ...model.model import Model
 from ...model.scene import Scene
 from ...page.template import template

@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 from markupsafe import Markup
 
+from ...errors import SimulationError
+from ...files import foreign
 from ...verification.result import as_text
 from ..sweep.plot import figure_of
 from ..sweep.table import happened, numbers, one_by_one, read_rows, varied
@@ -39,6 +41,12 @@ def study_in(path: Path) -> Study:
         rows.append(
             (n, *([as_text(x) for x in cells] or ["never"] * 3), runs[n].attrs.get("units", ""))
         )
+    with foreign(
+        lambda said: SimulationError(
+            f"{str(path)!r} cannot be drawn ({said}): expected runs of a sweep, with numbers of usual sizes"
+        )
+    ):
+        figure = svg(figure_of(found), "The study")
     facts = [(k.replace("_", " "), str(v)) for k, v in found.attrs.items() if v]
     return Study(
         Path(found.attrs.get("fmu", path.name)).stem,
@@ -46,5 +54,5 @@ def study_in(path: Path) -> Study:
         int((status != "ok").sum()),
         rows,
         facts,
-        svg(figure_of(found), "The study"),
+        figure,
     )

@@ -31,6 +31,7 @@ from sympy.core.function import AppliedUndef
 from sympy.core.relational import Relational
 
 from ... import names
+from ...files import write_whole
 from ...fmu.closed_forms import pack_closed_forms
 from ...mechanics.attitudes import angular_velocity
 from ...model.attitude import written_out
@@ -53,7 +54,7 @@ def lay_beside(fmu: Path, prepared: Prepared) -> None:
     """Write the equations to where the judge of the FMU looks for them."""
     variables = frozenset(v.name for v in prepared.table.variables)
     forms = lagrange(prepared.model, variables)
-    beside(fmu).write_bytes(pack_closed_forms(prepared.scene, forms, prepared.table))
+    write_whole(beside(fmu), pack_closed_forms(prepared.scene, forms, prepared.table))
 
 
 def lagrange(model: Model, variables: frozenset[str]) -> list[ClosedForm]:

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from ...errors import SettingError
+from ...files import foreign, parquet_of
 from ...methods import NUMBERS, unknown
 from ...names import METHOD
 
@@ -151,25 +152,37 @@ def from_file(path: Path) -> tuple[tuple[str, ...], Values]:
 
     if path.suffix not in (".csv", ".parquet"):
         raise SettingError(f"--from {str(path)!r}: expected a .csv or .parquet file")
-    try:
-        frame = pd.read_csv(path) if path.suffix == ".csv" else pd.read_parquet(path)
-    except Exception as error:
-        raise SettingError(f"--from {str(path)!r} cannot be read: {error}") from None
+    with foreign(
+        lambda said: SettingError(
+            f"--from {str(path)!r} cannot be read ({said}): expected finite numbers below a line of names"
+        )
+    ):
+        csv = path.suffix == ".csv"
+        frame = pd.read_csv(path, low_memory=False) if csv else parquet_of(path).to_pandas()
     names = tuple(str(c).strip() for c in frame.columns)
-    wrong = []
-    for name, column in zip(names, frame.columns, strict=True):
+    values, wrong = np.zeros((len(frame), len(names))), []
+    for k, name in enumerate(names):
+        column = frame.iloc[:, k].astype(object)
         if name == METHOD:
-            frame[column] = [NUMBERS.get(str(v).strip(), v) for v in frame[column]]
-        numbers = pd.to_numeric(frame[column], errors="coerce")
-        bad = np.flatnonzero(~np.isfinite(numbers.to_numpy(dtype=float, na_value=np.nan)))
-        if len(bad):
-            wrong.append(f"{name} in row {bad[0] + 1} is {frame[column].iloc[bad[0]]!r}")
+            column = column.map(lambda v: NUMBERS.get(str(v).strip(), v))
+        values[:, k] = [_finite(v) for v in column]
+        if len(bad := np.flatnonzero(np.isnan(values[:, k]))):
+            wrong.append(f"{name} in row {bad[0] + 1} is {column.iloc[bad[0]]!r}")
     if wrong or not len(frame):
         raise SettingError(
             f"--from {str(path)!r}: {'; '.join(wrong) or 'no rows'}; expected finite numbers below a "
             "line of names"
         )
-    return names, frame.to_numpy(dtype=float)
+    return names, values
+
+
+def _finite(value: Any) -> float:
+    """A number as it is, or written out; NaN for what is none."""
+    try:
+        found = float(value)
+    except (TypeError, ValueError, OverflowError):
+        return math.nan
+    return found if math.isfinite(found) else math.nan
 
 
 def design(

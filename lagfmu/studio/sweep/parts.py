@@ -7,16 +7,17 @@ import os
 import shutil
 import tempfile
 import warnings
-import zipfile
-from collections.abc import Iterator, Mapping
+import weakref
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ...errors import LagfmuWarning, SettingError, SimulationError
+from ...errors import LagfmuWarning, SettingError
+from ...files import content_of, foreign, json_of, parquet_of, write_whole
 
-RECORD = "sweep.json"
+RECORD, LARGEST = "sweep.json", 1_000_000  # bytes
 
 
 class PartWarning(LagfmuWarning):
@@ -31,14 +32,14 @@ class Parts:
         self.folder = Path(tempfile.mkdtemp(prefix="lagfmu_")) if folder is None else folder
         record = self.folder / RECORD
         if folder is not None and self.folder.exists() and any(self.folder.iterdir()):
-            try:
-                found = json.loads(record.read_text(encoding="utf-8"))
+            with foreign(
+                lambda said: SettingError(
+                    f"{str(folder)!r} is not the folder of a sweep ({RECORD} is missing or damaged: {said}): "
+                    "choose another --out"
+                )
+            ):
+                found = json_of(content_of(record, LARGEST))
                 differ = sorted(k for k in identity if found.get(k) != identity[k])
-            except (OSError, ValueError, AttributeError):
-                raise SettingError(
-                    f"{str(folder)!r} is not the folder of a sweep ({RECORD} is missing or damaged): choose "
-                    "another --out"
-                ) from None
             if differ:
                 raise SettingError(
                     f"{str(folder)!r} belongs to another sweep ({', '.join(differ)} differ): finish that "
@@ -49,12 +50,8 @@ class Parts:
                     f"{len(self.done)} finished chunks of this sweep are in {str(folder)!r}: go on with "
                     "--resume, or delete the folder"
                 )
-        try:
-            self.folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise SimulationError(f"cannot write {str(record)!r}: {error.strerror}") from None
-        text = json.dumps(identity, indent=1)
-        self._whole(RECORD, lambda path: path.write_text(text, encoding="utf-8"))
+        write_whole(record, json.dumps(identity, indent=1).encode())
+        self.release = _held(self.folder)
 
     @property
     def done(self) -> set[int]:
@@ -71,10 +68,11 @@ class Parts:
         """
         for number in sorted(self.done):
             try:
-                if number not in design:
-                    raise ValueError("the sweep has no such chunk")
-                self._check(number, design[number], points)
-            except (ValueError, KeyError, OSError, EOFError, zipfile.BadZipFile) as error:
+                with foreign(SettingError):
+                    if number not in design:
+                        raise ValueError("the sweep has no such chunk")
+                    self._check(number, design[number], points)
+            except SettingError as error:
                 place = self._place(number, "parquet")
                 warnings.warn(
                     f"{str(place)!r} is not used, and its runs are done again: {error}",
@@ -104,26 +102,17 @@ class Parts:
                 with path.open("wb") as file:
                     np.savez(file, part=np.array(number), values=trajectories)
 
-            self._whole(self._place(number, "npz").name, save)
-        name = self._place(number, "parquet").name
-        self._whole(name, lambda path: pq.write_table(table, path, write_page_checksum=True))
+            write_whole(self._place(number, "npz"), save)
+        write_whole(
+            self._place(number, "parquet"),
+            lambda path: pq.write_table(table, path, write_page_checksum=True),
+        )
 
     def _place(self, number: int, ending: str) -> Path:
         return self.folder / f"part_{number:08d}.{ending}"
 
-    def _whole(self, name: str, write: Any) -> None:
-        unfinished = self.folder / f"unfinished_{name}"
-        try:
-            write(unfinished)
-            synchronize(unfinished)
-            os.replace(unfinished, self.folder / name)
-        except OSError as error:
-            raise SimulationError(f"cannot write {str(self.folder / name)!r}: {error}") from None
-
     def _table(self, path: Path) -> Any:
-        import pyarrow.parquet as pq
-
-        return pq.read_table(path, page_checksum_verification=True)
+        return parquet_of(path, page_checksum_verification=True)
 
     def _trajectories(self, number: int) -> np.ndarray[Any, Any]:
         with np.load(self._place(number, "npz")) as found:
@@ -143,10 +132,25 @@ class Parts:
 
     def remove(self) -> None:
         """When all is assembled."""
+        self.release()
         shutil.rmtree(self.folder, ignore_errors=True)
 
 
-def synchronize(path: Path) -> None:
-    """Wait until a file is on the disk, so that a name that it gets is never that of half of it."""
-    with path.open("rb+") as file:
-        os.fsync(file.fileno())
+def _held(folder: Path) -> Callable[[], object]:
+    """Keep other sweeps out of a folder, until what this returns is called or this process ends.  Raises
+    SettingError if another one is in it."""
+    try:
+        import fcntl
+    except ImportError:
+        return lambda: None
+    opened = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(opened, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        os.close(opened)
+        raise SettingError(
+            f"another sweep writes to {str(folder)!r} now: wait until it ends, or choose another --out"
+        ) from None
+    except OSError:  # a file system without locks
+        pass
+    return weakref.finalize(_held, os.close, opened)

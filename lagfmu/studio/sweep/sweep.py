@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import SettingError, SimulationError
+from ...files import write_whole
 from ...fmu.archive import unpack, version
 from ...fmu.batch import Plan
 from ...fmu.inputs import check_inputs, columns_at, warn_of_rates
@@ -115,6 +116,8 @@ def sweep(
             if parts.temporary:
                 parts.remove()
             raise
+        finally:
+            parts.release()
         parts.remove()
         return found
 
@@ -376,12 +379,10 @@ def _save(found: Any, out: Path) -> None:
     """netCDF or Zarr.  Raises SimulationError."""
     try:
         if out.suffix == ".zarr":
-            found.to_zarr(out, mode="w")
+            write_whole(out, lambda place: found.to_zarr(place, mode="w"))
         else:
-            found.to_netcdf(out, engine="h5netcdf")
+            write_whole(out, lambda place: found.to_netcdf(place, engine="h5netcdf"))
     except (ImportError, ModuleNotFoundError, ValueError) as error:
         raise SimulationError(
             f"cannot write {str(out)!r}: {error}: pip install xarray h5netcdf h5py zarr"
         ) from None
-    except OSError as error:
-        raise SimulationError(f"cannot write {str(out)!r}: {error.strerror or error}") from None

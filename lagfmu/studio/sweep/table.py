@@ -6,8 +6,8 @@ timeout), `reason`, start values that were `moved`, and the time that it reached
 
 from __future__ import annotations
 
+import contextlib
 import json
-import os
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -19,15 +19,17 @@ import numpy as np
 
 from ... import names
 from ...errors import SimulationError
+from ...files import content_of, foreign, json_of, parquet_of, write_whole
 from ...fmu.batch import Outcome
 from ...fmu.session import STATUS
 from .design import Design
 from .keep import Kept
-from .parts import Parts, synchronize
+from .parts import Parts
 from .process import CRASHED, TIMED_OUT
 
 INFINITE = sys.float_info.max  # stands for infinity where an FMU's Real must be finite: error bars
 TEXTS = ("status", "reason", "moved")
+LARGEST = 10_000_000  # bytes of what stands beside it
 METADATA = "-metadata.json"  # of a CSV file, behind its name: W3C's tabular metadata
 
 
@@ -92,23 +94,21 @@ def write_rows(parts: Parts, path: Path, layout: Layout) -> None:
     import pyarrow.csv as csv
     import pyarrow.parquet as pq
 
-    unfinished = path.with_name(f".{path.name}.unfinished")
     write = csv.CSVWriter if path.suffix == ".csv" else pq.ParquetWriter
-    writer: Any = None
-    try:
-        for table in parts.tables():
-            if writer is None:
-                writer = write(unfinished, table.schema)
-                if path.suffix == ".csv":
-                    about = json.dumps(_metadata(path.name, table.schema, layout.facts), indent=1)
-                    path.with_name(path.name + METADATA).write_text(about, encoding="utf-8")
-            writer.write_table(table)
-        writer.close()
-        synchronize(unfinished)
-        os.replace(unfinished, path)
-    except OSError as error:
-        unfinished.unlink(missing_ok=True)
-        raise SimulationError(f"cannot write {str(path)!r}: {error.strerror or error}") from None
+
+    def rows(place: Path) -> None:
+        with contextlib.ExitStack() as last:
+            writer: Any = None
+            for table in parts.tables():
+                if writer is None:
+                    writer = last.enter_context(write(place, table.schema))
+                    schema = table.schema
+                writer.write_table(table)
+        if path.suffix == ".csv":
+            about = json.dumps(_metadata(path.name, schema, layout.facts), indent=1)
+            write_whole(path.with_name(path.name + METADATA), about.encode())
+
+    write_whole(path, rows)
 
 
 def _metadata(name: str, schema: Any, facts: Mapping[str, str]) -> dict[str, Any]:
@@ -204,43 +204,42 @@ def read_rows(path: Path) -> Any:
 
     Raises SimulationError for a file that is none of a sweep's.
     """
+    with foreign(
+        lambda said: SimulationError(
+            f"{str(path)!r} is no table that lagfmu sweep wrote ({said}): expected its .parquet file, or its "
+            f".csv file with {path.name}{METADATA} beside it"
+        )
+    ):
+        return _rows(path)
+
+
+def _rows(path: Path) -> Any:
     import pandas as pd
     import xarray as xr
 
-    try:
-        if path.suffix == ".csv":
-            rows = pd.read_csv(path, keep_default_na=False, na_values=["nan", ""])
-            about = json.loads(path.with_name(path.name + METADATA).read_text(encoding="utf-8"))
-            facts = about["notes"][0]
-            units = {
-                c["titles"]: c.get("schema:unitText", "") for c in about["tableSchema"]["columns"]
-            }
-        else:
-            import pyarrow.parquet as pq
-
-            table = pq.read_table(path)
-            facts = json.loads(table.schema.metadata[b"lagfmu"])
-            units = {f.name: f.metadata[b"unit"].decode() for f in table.schema}
-            rows = table.to_pandas()
-        names = [n for n in rows.columns if n not in ("run", "reached", *TEXTS)]
-        causes = [n for n in names if ":" not in n]
-        dim = causes[0] if len(causes) == 1 and rows[causes[0]].is_monotonic_increasing else "run"
-        made = xr.Dataset(
-            {n: (dim, rows[n].to_numpy()) for n in (*names, "reached") if n not in causes},
-            {
-                n: (dim, rows[n].to_numpy(float))
-                for n in (*causes, "run")
-                if n == dim or n in causes
-            },
-            dict(facts),
-        )
-        for n in TEXTS:
-            made[n] = (dim, rows[n].fillna("").to_numpy(object))
-        for n in made.variables:
-            made[n].attrs["units"] = units.get(str(n), "")
-    except (OSError, ValueError, KeyError, TypeError, IndexError) as error:
-        raise SimulationError(
-            f"{str(path)!r} is no table that lagfmu sweep wrote ({error}): expected its .parquet file, or "
-            f"its .csv file with {path.name}{METADATA} beside it"
-        ) from None
+    if path.suffix == ".csv":
+        rows = pd.read_csv(path, keep_default_na=False, na_values=["nan", ""])
+        about = json_of(content_of(path.with_name(path.name + METADATA), LARGEST))
+        facts = about["notes"][0]
+        units = {c["titles"]: c.get("schema:unitText", "") for c in about["tableSchema"]["columns"]}
+    else:
+        table = parquet_of(path)
+        facts = json_of(table.schema.metadata[b"lagfmu"])
+        units = {f.name: f.metadata[b"unit"].decode() for f in table.schema}
+        rows = table.to_pandas()
+    names = [n for n in rows.columns if n not in ("run", "reached", *TEXTS)]
+    causes = [n for n in names if ":" not in n]
+    for n in causes:
+        if not np.isfinite(rows[n].to_numpy(float)).all():
+            raise ValueError(f"{n!r} varies through what is no finite number")
+    dim = causes[0] if len(causes) == 1 and rows[causes[0]].is_monotonic_increasing else "run"
+    made = xr.Dataset(
+        {n: (dim, rows[n].to_numpy(float)) for n in (*names, "reached") if n not in causes},
+        {n: (dim, rows[n].to_numpy(float)) for n in (*causes, "run") if n == dim or n in causes},
+        {str(k): str(v) for k, v in dict(facts).items()},
+    )
+    for n in TEXTS:
+        made[n] = (dim, rows[n].fillna("").astype(str).to_numpy(object))
+    for n in made.variables:
+        made[n].attrs["units"] = str(units.get(str(n), ""))
     return made
