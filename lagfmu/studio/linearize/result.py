@@ -13,7 +13,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from ...errors import UsageError
-from ...fmu.write import write_whole
+from ...files import write_whole
 from ...model.units import for_reading
 from ...page.table import as_text, new_table
 from .exchange import Floats
