@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -47,7 +48,7 @@ def missed(result: Any, k: int, wanted: dict[str, float]) -> float:
     return max(abs(result[n][k] - x) for n, x in told.items()) / largest
 
 
-@pytest.mark.parametrize("name", ["four_bar", "five_bar", "jansen", "delta", "leg"])
+@pytest.mark.parametrize("name", ["four_bar", "five_bar", "jansen", "delta", "leg", "slider_crank"])
 def test_the_joints_of_a_loop_receive_what_newton_and_euler_say(name: str) -> None:
     """MuJoCo's M, bias and Jacobians with rigid loops, integrated by SciPy, and the wrench of each joint from
     the accelerations of all that hangs on it; driven for half a second."""
@@ -227,3 +228,22 @@ def test_a_slider_crank_as_a_file_has_the_forces_of_the_model() -> None:
     for name in ("force.A.x", "force.A.y", "force.B.x", "force.B.y", "force.C.x", "force.C.y"):
         same(found[name], wanted[name], err_msg=name)
     same(found["force.D.y"], wanted["force.D.y"])  # the file's slide has its z along x
+
+
+PIN = '<joint name="{}" axis="0 1 0"/><geom type="capsule" size="0.02" fromto="0 0 0 {}"/>'
+
+
+def test_a_crank_that_turns_all_round_passes_no_singular_configuration(tmp_path: Path) -> None:
+    """0.3 + 0.922 < 0.8 + 0.51 m (Grashof): its four links are never on one line, and the row that is
+    redundant everywhere is no crossing where it may be another than before."""
+    path = tmp_path / "m.xml"
+    path.write_text(
+        f'<mujoco model="M"><worldbody><body name="crank">{PIN.format("A", "0 0 0.3")}'
+        f'<body name="coupler" pos="0 0 0.3">{PIN.format("B", "0.9 0 0.2")}</body></body>'
+        f'<body name="rocker" pos="0.8 0 0">{PIN.format("D", "0.1 0 0.5")}</body></worldbody><equality>'
+        '<connect name="C" body1="coupler" body2="rocker" anchor="0.9 0 0.2"/></equality></mujoco>'
+    )
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        run(path, stop_time=1.0, tolerance=1e-6)
+    assert not [str(w.message) for w in caught if "singular" in str(w.message)]

@@ -31,12 +31,12 @@ class Rigid:
         self.d = mujoco.MjData(self.m)
         off = mujoco.mjtDisableBit
         self.m.opt.disableflags |= int(off.mjDSBL_CONSTRAINT)
+        mujoco.mj_kinematics(self.m, self.d)
+        self.axes = self.d.xaxis.copy()
+        self.turned = self.d.xmat.reshape(-1, 3, 3).copy()
         if key >= 0:
             mujoco.mj_resetDataKeyframe(self.m, self.d, key)
         self.begin = np.concatenate([self.d.qpos, self.d.qvel])
-        self.look(self.begin)
-        self.axes = self.d.xaxis.copy()
-        self.turned = self.d.xmat.reshape(-1, 3, 3).copy()
 
     def look(self, y: Vector) -> None:
         """Everything at a state."""
@@ -129,8 +129,7 @@ class Rigid:
 
     def forces(self, y: Vector) -> dict[str, float]:
         """force.J.x, .y, .z of hinges, slides and equalities, in the axes of the first body that are the
-        second's at the beginning, z that of the joint; torque.J.x, .y of hinges that are alone in their body.
-        """
+        second's as the file has them, z that of the joint; torque.J.x, .y of lone hinges."""
         vdot, f = self.solve(y)
         m, d = self.m, self.d
         found: dict[str, float] = {}

@@ -35,6 +35,8 @@ static const double ENDS_BEFORE = 0.28; /* of the next step: how far before a cr
 static const double BACKED = 0.4;      /* of a step that ended in one: by so much it is shortened */
 static const double LOOK_AHEAD = 1e-4; /* natural times, in which it is seen how fast the angle falls */
 static const double LANDED = 1e-3;    /* angle below which a step ended in a crossing, from which none begins */
+static const double OTHERS = 30;      /* times as far apart are the rows of another choice, where only those of the
+                                       * step meet; where branches cross all meet alike */
 static const double PLACED = 1e-9;   /* of a step: how well the time of a passage is found */
 static const double BESIDE = 1e-3;   /* of a step: how far beside it all rows are looked at */
 
@@ -130,7 +132,11 @@ static Status tell(Solver *s, double t) {
     if (s->state.now.dependent) {
         const double beside = t + BESIDE * (i->t - i->t_old);
         i->method->dense(i, beside, s->part.passage->there);
-        if (!all_narrow(s, beside, s->part.passage->there, 0)) return OK;
+        if (crossing_factor(s, beside, s->part.passage->there, DBL_MIN) != OK) return FAILED;
+        const double own = linear_apart(&s->stepped.linear);
+        if (!all_narrow(s, beside, s->part.passage->there, 0) ||
+            linear_furthest_apart(&s->stepped.linear) > OTHERS * own)
+            return OK;
     }
     i->method->dense(i, t, s->part.passage->there);
     if (crossing_factor(s, t, s->part.passage->there, CROSSING_NAMING) != OK) return FAILED;
