@@ -20,8 +20,8 @@ from sympy import sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
 from tops import door
 
-from lagfmu import Contact, Model, Output, Parameter, Scene, multiplier, simulate
-from lagfmu.errors import ModelError
+from lagfmu import Contact, Holonomic, Model, Output, Parameter, Scene, multiplier, simulate
+from lagfmu.errors import ModelError, SimulationError
 from lagfmu.testing import Stage, prepare
 
 pytestmark = [
@@ -223,6 +223,59 @@ def test_a_unique_output_has_a_derivative_where_its_multipliers_have_none(built)
         )
         with pytest.raises(FMICallException):
             one.fmu.getDirectionalDerivative([one_alone], known, [1.0])
+
+
+def test_a_light_bob_on_a_heavy_cart_leaves_the_centre_of_mass_where_it_is():
+    """1 mg beside 1,000 t, from rest at 1 rad: M X + m (x - x0) = 0, so that the cart moves by 1e-12 m,
+    and the rod has lambda = -m g (3 cos theta - 2 cos 1)/(2 L) as on a cart that is held."""
+    X, x, y = dynamicsymbols("X x y")
+    M, m, g, L = symbols("M m g L", positive=True)
+    model = Model(
+        name="Unlike",
+        lagrangian=M * X.diff() ** 2 / 2 + m * (x.diff() ** 2 + y.diff() ** 2) / 2 - m * g * y,
+        coordinates={X: "m", x: "m", y: "m"},
+        constraints=[Holonomic("rod", (x - X) ** 2 + y**2 - L**2)],
+        parameters=[
+            Parameter(M, 1e6, "kg"),
+            Parameter(m, 1e-6, "kg"),
+            Parameter(g, 9.81, "m/s^2"),
+            Parameter(L, 1.0, "m"),
+        ],
+        start={X: 0.0, x: np.sin(1), y: -np.cos(1)},
+    )
+    run = simulate(model, target="native", stop_time=2.0, step_size=0.1, tolerance=1e-10)
+    assert np.abs(1e12 * run["X"] + run["x"] - np.sin(1)).max() < 1e-11
+    force = -1e-6 * 9.81 * (-3 * run["y"] - 2 * np.cos(1)) / 2
+    np.testing.assert_allclose(run["lambda.rod"], force, rtol=1e-8)
+    assert run["solver.steps"][-1] < 100
+
+
+def test_rows_that_come_to_contradict_each_other_are_named():
+    """x = L, and x = L + a t^6/T^4: at the start they are one row, up to the fourth derivative; then one says
+    that x rests, and the other that it does not.  That is no singular place."""
+    x, y = dynamicsymbols("x y")
+    m, L, a, T = symbols("m L a T", positive=True)
+    model = Model(
+        name="Contradicted",
+        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2,
+        forces={y: m * a},
+        coordinates={x: "m", y: "m"},
+        constraints=[
+            Holonomic("still", x - L),
+            Holonomic("led", x - L - a * dynamicsymbols._t**6 / T**4),
+        ],
+        parameters=[
+            Parameter(m, 1.0, "kg"),
+            Parameter(L, 1.0, "m"),
+            Parameter(a, 1.0, "m/s^2"),
+            Parameter(T, 1.0, "s"),
+        ],
+        start={x: L},
+    )
+    with pytest.raises(
+        SimulationError, match="contradict each other at this state: 'still', 'led'"
+    ):
+        simulate(model, target="native", stop_time=1.0, step_size=0.1)
 
 
 @pytest.mark.parametrize("target", ["native", "python"])
