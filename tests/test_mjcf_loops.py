@@ -247,3 +247,18 @@ def test_a_crank_that_turns_all_round_passes_no_singular_configuration(tmp_path:
         warnings.simplefilter("always")
         run(path, stop_time=1.0, tolerance=1e-6)
     assert not [str(w.message) for w in caught if "singular" in str(w.message)]
+
+
+def test_sites_are_frames_that_are_read_where_the_file_has_them() -> None:
+    """The tips of both arms of the five-bar, which are one point, through half a second of its servos."""
+    path = LOOPS / "five_bar.xml"
+    by_hand = Rigid(path, 0)
+    parts = from_mjcf(path, key="reach")
+    model = mechanism(parts.name, **parts.arguments, read=parts.frames)
+    result = simulate(model, stop_time=SAMPLES[-1], step_size=SAMPLES[1], tolerance=1e-11)
+    for k, state in enumerate(by_hand.moved(SAMPLES)):
+        by_hand.look(state)
+        for name in ("tip", "end"):
+            found = [result[f"{name}.position.{x}"][k] for x in "xyz"]
+            wanted = by_hand.d.site(name).xpos
+            np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-10)
