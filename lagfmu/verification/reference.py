@@ -102,11 +102,15 @@ def read_table(path: Path, gaps: bool = False) -> Trajectory:
     """A CSV file with a column `time` [s]; with `gaps` an empty cell is NaN.  Raises SettingError with what
     is wrong with it."""
     with foreign(
+        lambda said: SettingError(f"{str(path)!r} cannot be read: {said}: correct the path")
+    ):
+        content = content_of(path, LARGEST)
+    with foreign(
         lambda said: SettingError(
             f"{str(path)!r} is no table ({said}): expected names, and rows of numbers"
         )
     ):
-        rows = csv_of(content_of(path, LARGEST))
+        rows = csv_of(content)
         names = [n.strip() for n in next(rows, [])]
         _check_names(path, names)
         cells, bad = _cells(path, names, rows, gaps)
