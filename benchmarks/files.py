@@ -2,17 +2,16 @@
 
     pip install pin example-robot-data pybullet robot-properties-fingers hello-robot-stretch-urdf \
         jvrc-description armar airo-models dexmate-urdf
-    python benchmarks/files.py [--in SITE-PACKAGES] [--build N] [WORD ...]
+    python benchmarks/files.py [--in SITE-PACKAGES] [--package NAME] [--build N] [WORD ...]
 
 Nothing is downloaded.  Of each file with at least two joints that move: taken, refused, or broken, with the
 cause; of what is taken the largest difference of the accelerations of all bodies, and of all six components
 of the wrench in each joint, from Pinocchio's at three random states, relative to the largest of each.
 Friction, damping and limits are off; <mimic> is a constraint in both, whose effort Pinocchio counts to the
-wrenches.  A file is broken where Pinocchio does
-not read it either, where its M is singular, or where what it says cannot be (a moment of inertia above the
-sum of the others, a joint that follows one that there is not).  Every N-th of the files that are taken is
-built, as the command does it: seconds of processor time, of the compiler too, and size of the FMU.  WORD:
-only files whose path holds it.
+wrenches.  A file that is refused is broken where Pinocchio does not read it either, where its M is singular,
+or where what it says cannot be (a moment of inertia above the sum of the others, a joint that follows one
+that there is not).  With --build every N-th of those that are taken is built, without the run that verifies
+it: seconds of processor time, of the compiler too, and size of the FMU.  WORD: files whose path holds it.
 """
 
 from __future__ import annotations
@@ -156,6 +155,10 @@ def _slippery(joint: Any) -> Any:
     return replace(joint, **dict.fromkeys(names)) if names else joint
 
 
+class NotReadError(Exception):
+    """Pinocchio does not read what lagfmu takes."""
+
+
 class Mine:
     """A file as lagfmu reads it."""
 
@@ -240,7 +243,11 @@ def _words(parts: Any) -> dict[str, str]:
 
 def compared(path: Path, seed: int = 1) -> tuple[float, float, int]:
     """The largest relative differences of accelerations and of wrenches; how many joints move."""
-    mine, there = Mine(path), Reference(path)
+    mine = Mine(path)
+    try:
+        there = Reference(path)
+    except (ValueError, RuntimeError, KeyError) as error:
+        raise NotReadError from error
     rng = np.random.default_rng(seed)
     far = [0.0, 0.0]
     size = [-GRAVITY[2], 0.0]
@@ -296,14 +303,15 @@ def built(path: Path, into: Path) -> tuple[float, int]:
         return sum(r.ru_utime + r.ru_stime for r in of)
 
     before = spent()
-    fmu = build_fmu(load(path).model, into)
+    fmu = build_fmu(load(path).model, into, check=False)
     return spent() - before, Path(fmu).stat().st_size
 
 
 def moving(path: Path) -> int:
     """How many joints of a file move; of one that is no XML how many say so."""
-    text = path.read_bytes()
-    return sum(text.count(f'type="{kind}"'.encode()) for kind in MOVES)
+    return len(
+        re.findall(rf"type\s*=\s*[\"'](?:{'|'.join(MOVES)})[\"']".encode(), path.read_bytes())
+    )
 
 
 def cause(error: Exception) -> str:
@@ -376,6 +384,10 @@ def main() -> None:
             try:
                 with silence():
                     a, f, n = compared(path)
+            except NotReadError:
+                counts[package]["taken"] += 1
+                print(f"{shown}: taken, not compared: Pinocchio does not read it", flush=True)
+                continue
             except (LagfmuError, ValueError, RuntimeError) as error:
                 with silence():
                     broken = why_broken(path, error)
