@@ -128,7 +128,8 @@ class Session:
         except Exception as error:
             if self.folder is None:  # of the slave in this process
                 raise
-            raise RefusalError("instantiate", ERROR, self.reason(str(error))) from None
+            said = f"{self.reason(str(error))}: build the FMU anew, or correct it"
+            raise RefusalError("instantiate", ERROR, said) from None
         self.used = False
 
     def close(self) -> None:
