@@ -39,7 +39,7 @@ SECONDS = 5  # of the processor, for one edit
 MEMORY = 500 * 2**20  # bytes, beside what the program itself has
 LONGEST = 21_000  # letters of a message
 REMEDY = re.compile(
-    r"expected|lacks|keep|correct|choose|give|remove|leave (?:one |the row |some )?out|build|write|put|save|"
+    r"expected|lacks|keep|correct|choose|give|remove|leave (?:[a-z ]+)?out|fill|build|write|put|save|"
     r"shorten|rename|copy|expand|another|did you mean|is there|make|exchange|take|use|again|anew"
 )
 XML = "modelDescription.xml"

@@ -97,7 +97,7 @@ def series_of(
         elif use == "output":
             measured[name] = column
         elif np.isnan(column).any():
-            problems.append(f"{what}{name!r} is no output, and has gaps")
+            problems.append(f"{what}{name!r} is no output, and has gaps: fill them")
         elif use == "input":
             driven[name] = column
         elif np.ptp(column):
@@ -113,7 +113,7 @@ def series_of(
         measured = {n: c for n, c in measured.items() if n in chosen}
     for name, column in measured.items():
         if np.isnan(column).all():
-            problems.append(f"{what}{name!r} has gaps alone")
+            problems.append(f"{what}{name!r} has gaps alone: leave the column out")
     if not measured:
         problems.append(f"{what}nothing was measured, expected a column that is an output")
     if len(problems) > before:
