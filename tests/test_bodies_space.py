@@ -30,6 +30,7 @@ from lagfmu.bodies import (
     Prismatic,
     Revolute,
     Rolling,
+    Screw,
     Spherical,
     Torsion,
     Universal,
@@ -51,6 +52,7 @@ KINDS = [
         pytest.param(kind, marks=pytest.mark.thorough)
         for kind in (Cylindrical, Planar, Spherical, Fixed, PointOnPlane)
     ),
+    pytest.param(lambda name, a, b: Screw(name, a, b, lead=0.2), id="Screw"),
     pytest.param(
         lambda name, a, b: Distance(name, a, b, 0.6), id="Distance", marks=pytest.mark.thorough
     ),
@@ -539,3 +541,56 @@ def test_a_quaternion_that_is_given_with_another_norm_is_told():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         mechanism("M", bodies=[arm], start={"arm.orientation": (0.707, 0.707, 0, 0)})
+
+
+def screw(lead=0.5, start=None, loads=(), limits=None, **more):
+    """A nut of 2 kg and 0.05 kg m^2 on a vertical screw."""
+    nut = Body("nut", 2.0, (0.03, 0.03, 0.05))
+    joint = Screw("S", ground.at((0, 0, 0)), nut.at((0, 0, 0)), lead=lead, limits=limits, **more)
+    loads = [Gravity((0, 0, -g)), *loads]
+    return mechanism("Nut", bodies=[nut], joints=[joint], loads=loads, start=start)
+
+
+@pytest.mark.parametrize("lead", [0.5, -0.5])
+def test_a_nut_falls_down_its_thread(lead):
+    """alpha = -m g h / (J + m h^2), h = lead / (2 pi); the thread carries F = m (g + a) and takes -h F: what
+    is left of the weight turns the nut, over more than a turn, from where the angle begins."""
+    h, m, J = lead / (2 * pi), 2.0, 0.05
+    result = simulate(screw(lead, {"angle.S": 4 * pi}), 1.0)
+    alpha = -m * g * h / (J + m * h**2)
+    t = result["time"]
+    thrust = m * (g + h * alpha)
+    assert result["angle.S"] == pytest.approx(4 * pi + alpha * t**2 / 2, abs=1e-8 * 4 * pi)
+    assert result["position.S"] == pytest.approx(h * result["angle.S"], abs=1e-9)
+    assert result["nut.position.z"] == pytest.approx(result["position.S"], abs=1e-9)
+    assert result["force.S.z"] == pytest.approx(thrust, rel=1e-7)
+    assert result["torque.S.z"] == pytest.approx(-h * thrust, rel=1e-7)
+
+
+def test_a_motor_holds_the_load_of_a_screw():
+    """m g h holds the nut: the joint passes on its weight, and no torque, since the motor is part of it."""
+    h = 0.5 / (2 * pi)
+    model = screw(0.5, {"position.S": 0.1}, [Motor("drive", "angle.S", torque=2.0 * g * h)])
+    result = simulate(model, 1.0)
+    assert result["position.S"] == pytest.approx(0.1, abs=1e-9)
+    assert result["force.S.z"] == pytest.approx(2.0 * g, rel=1e-9)
+    assert abs(result["torque.S.z"]).max() < 1e-9
+
+
+def test_a_screw_stops_at_the_limit_of_its_angle():
+    """Limits are of the angle: the nut stands a turn below where it began."""
+    result = simulate(screw(limits=(-2 * pi, 2 * pi)), 3.0)
+    assert result["angle.S"][-1] == pytest.approx(-2 * pi, abs=1e-8)
+    assert result["nut.position.z"][-1] == pytest.approx(-0.5, abs=1e-8)
+
+
+def test_screws_that_are_none_are_refused():
+    """Without a lead, or with friction that no law here gives."""
+    with pytest.raises(ModelError, match=r"Screw 'S': lead is 0\.0"):
+        screw(lead=0.0)
+    with pytest.raises(ModelError, match="Screw 'S': friction is given"):
+        screw(friction=0.1, radius=0.01)
+    nut = Body("nut", 2.0, 0.05)
+    joint = Screw("S", ground.at((0, 0)), nut.at((0, 0)), lead=0.5)
+    with pytest.raises(ModelError, match="Screw 'S' is a joint in space"):
+        mechanism("Nut", plane="xy", bodies=[nut], joints=[joint])

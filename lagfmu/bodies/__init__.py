@@ -13,6 +13,7 @@ from .joints import (
     Prismatic,
     Revolute,
     Rolling,
+    Screw,
     Spherical,
     Universal,
 )
@@ -40,6 +41,7 @@ __all__ = [
     "Revolute",
     "Rolling",
     "Rotor",
+    "Screw",
     "Series",
     "Spherical",
     "SpringDamper",

@@ -12,7 +12,7 @@ from ..model.picture import Track
 from ..model.spline import Spline
 from .body import several
 from .curves import PointOnCurve
-from .joints import Gear, Joint, Planar, Universal, name_of_joint
+from .joints import Gear, Joint, Planar, Screw, Universal, name_of_joint
 from .loads import Motor, Rotor, Torsion
 from .vectors import AXES
 
@@ -67,6 +67,14 @@ def _of_joint(joint: Joint, planar: bool) -> Iterator[str]:
         yield f"{what}: friction is given, but only {rubs} rub: leave it out"
     elif joint.friction is not None and joint.turns and not value_of(joint.radius):
         yield f"{what}: friction is given without the radius of the pin, expected radius=... in m"
+    if isinstance(joint, Screw) and joint.friction is not None:
+        yield f"{what}: friction is given, but a thread has none here: brake its turn by a Torsion's damping"
+    if (
+        isinstance(joint, Screw)
+        and is_number(value_of(joint.lead))
+        and not float(value_of(joint.lead))
+    ):
+        yield f"{what}: lead is {joint.lead!r}, expected metres a turn, not 0 (left-handed: negative)"
     yield from _of_constant(what, joint)
     if joint.length is not None and joint.friction is None:
         yield f"{what}: the length of its bearing is given, but no friction: give friction, or leave it out"
@@ -77,7 +85,8 @@ def _of_joint(joint: Joint, planar: bool) -> Iterator[str]:
         if not is_number(joint.restitution) or float(joint.restitution):  # type: ignore[arg-type]
             yield f"{what}: restitution is given, but no limits at which it could rebound: give limits"
         return
-    if (joint.slides and joint.turns) or not (joint.slides or joint.turns):
+    both = joint.slides and joint.turns and not isinstance(joint, Screw)
+    if both or not (joint.slides or joint.turns):
         yield f"{what}: limits are given, but it has no angle or position to be limited: leave them out"
     elif isinstance(limits, str) or not isinstance(limits, Sequence) or len(limits) != 2:
         yield f"{what}: limits are {limits!r}, expected the smallest and the largest value"

@@ -273,6 +273,32 @@ class Cylindrical(Joint):
 
 
 @dataclass(frozen=True, eq=False)
+class Screw(Cylindrical):
+    """A nut on a thread (in space): the second marker moves along an axis of the first by `lead` [m] in each
+    turn, position = lead / (2 pi) angle (a right-handed thread has a positive lead), as a helical joint does
+    (Featherstone, Rigid Body Dynamics Algorithms, 2008, sect. 4.4).
+
+    The multiplier of NAME.z is the thrust F [N] on the second body along the axis; with it goes the torque
+    -lead / (2 pi) F about the axis, so that the thread takes no power.
+    """
+
+    lead: Number = 0.0
+
+    def coordinate(self, draft: Draft, a: Placed, b: Placed, axis: int, wrench: Wrench) -> None:
+        """Both motions, and the row of the thread."""
+        super().coordinate(draft, a, b, axis, wrench)
+        turn = draft.angle(self.measures[0], a, b, axis)
+        slide = product(a.axes[axis], between(a, b))
+        text = f"way of {self.name} along its axis in a turn"
+        pitch = draft.number(self.lead, f"{self.name}.lead", "m", text) / (2 * sp.pi)
+        row = f"{self.name}.{AXES[axis]}"
+        thread = Timed(*(s - pitch * t for s, t in zip(slide, turn, strict=True)))
+        draft.hold(row, thread, f"{self.name} moves along its axis as it turns")
+        wrench.force[axis] += multiplier(row)
+        wrench.torque[axis] -= pitch * multiplier(row)
+
+
+@dataclass(frozen=True, eq=False)
 class Planar(Joint):
     """The second marker slides in the plane of the first whose normal is the axis, and turns about it (in
     space)."""
