@@ -8,6 +8,7 @@ import io
 import json
 import os
 import re
+import shutil
 import stat
 import tempfile
 import tomllib
@@ -148,7 +149,7 @@ def write_whole(path: Path, content: bytes | Write) -> None:
             write(path)
             return
         path.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=path.parent, prefix=".lagfmu_") as folder:
+        with _room_beside(path) as folder:
             made = Path(folder, path.name)
             write(made)
             if made.is_file():
@@ -165,6 +166,17 @@ def write_whole(path: Path, content: bytes | Write) -> None:
         raise BuildError(
             f"cannot write {str(path)!r} ({error.strerror or error}): {remedy}"
         ) from None
+
+
+@contextlib.contextmanager
+def _room_beside(path: Path) -> Iterator[str]:
+    folder = tempfile.mkdtemp(dir=path.parent, prefix=".lagfmu_")
+    try:
+        yield folder
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+        with contextlib.suppress(OSError):  # where no more files may be opened
+            os.rmdir(folder)
 
 
 def _synchronize(path: Path) -> None:
