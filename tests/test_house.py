@@ -100,6 +100,13 @@ def test_the_core_knows_no_studio(tmp_path: Path) -> None:
     assert not (copy / "studio").exists()
 
 
+@pytest.mark.parametrize("folder", sorted(p.parent.name for p in ROOT.glob("*/__init__.py")))
+def test_a_folder_says_what_it_is_for(folder: str) -> None:
+    """What comes in, what goes out, and what it never knows."""
+    words = (ROOT / folder / "__init__.py").read_text()
+    assert all(f"\n{said}: " in words for said in ("In", "Out", "Never knows"))
+
+
 def test_no_module_is_imported_in_secret() -> None:
     """A room that is imported by a name in a text is no arrow that anybody sees."""
     secret = re.compile(r"\b(import_module|__import__)\(\s*f?[\"'](lagfmu|\.)")

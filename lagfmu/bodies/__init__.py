@@ -1,4 +1,9 @@
-"""Bodies and joints: a mechanism as an engineer lists it, and the Model that it is."""
+"""Bodies and joints: a mechanism as an engineer lists it, and the Model that it is.
+
+In: bodies, joints and loads, or a URDF or MJCF file.
+Out: a `Model` with a start at which the joints close.
+Never knows: the solver and FMI.
+"""
 
 from .body import Body, Ground
 from .contacts import Contact

@@ -1,4 +1,9 @@
-"""The commands: options in, a call, tables and plots out."""
+"""The commands: options in, a call, tables and plots out.
+
+In: the words of a command line.
+Out: a call, and its answer as tables and plots.
+Never knows: mechanics: the work is done by `api.py` and the rooms.
+"""
 
 import atexit
 import gc
