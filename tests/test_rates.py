@@ -327,6 +327,21 @@ def test_a_motion_that_is_not_set_stays_where_it_was_set(estimating):
         assert one.get("der(l)") == pytest.approx(0.0, abs=1e-12)
 
 
+@pytest.mark.parametrize("target", ["native", "python"])
+def test_a_cubic_motion_is_known_at_the_end_of_a_step(estimating, target):
+    """Four points tell it: what hangs on the rope moves at l'(t) = 0.15 t^2 at the end of the step, before
+    the next point is set."""
+    with instance(estimating(target)) as one:
+        one.start({"x": 0.0, "y": -7.8125, "der(x)": 0.0, "der(y)": 0.0})
+        for k in range(6):
+            t = 0.1 * k
+            one.set("l", 7.8125 + 0.05 * t**3)
+            one.step(0.1)
+        t += 0.1
+        assert one.get("y") == pytest.approx(-7.8125 - 0.05 * t**3, abs=1e-9)
+        assert one.get("der(y)") == pytest.approx(-0.15 * t**2, abs=1e-8)
+
+
 def test_rates_are_given_or_estimated():
     """Another word, and rates of a force, are refused."""
     with pytest.raises(
