@@ -16,12 +16,13 @@ import numpy as np
 
 from ..numeric.failure import StartFailureError, StepFailureError
 from ..numeric.system import Vector
-from .equations import Motion
-from .linear import Rows
+from .equations import Motion, Terms
+from .linear import Rows, rows_of
 from .projection import project_positions, project_velocities
 from .state import Settings, State
 
 NEAR = 1e-2  # singular value of the scaled rows below which a crossing may be near
+ROUNDING = 1e-14  # a smaller one is that of rows which depend on each other everywhere
 BESIDE = 3e-3  # of the motion's size: how far along the branch lambda is looked at
 OPENS = 2  # times as large is the singular value there, where it is small at a crossing only
 POLYNOMIAL = 5.0, -10.0, 10.0, -5.0, 1.0  # through so many places: what it is at the start
@@ -29,15 +30,18 @@ LOST = 1e-3  # of the forces at work: lambda that differs by more has lost its d
 
 
 class Place(NamedTuple):
-    """Accelerations (nv), multipliers (m) and decomposed rows at a state on the constraints."""
+    """Accelerations (nv), multipliers (m) and decomposed rows at a state on the constraints; `alike`: the same
+    rows whatever the masses are, each speed counting by what it moves, since a light mass between heavy ones is
+    no crossing."""
 
     vdot: Vector
     lam: Vector
     rows: Rows
+    alike: Rows
 
     def apart(self, rank: int) -> float:
         """The smallest singular value, as many rows being independent."""
-        return float(self.rows.S[rank - 1])
+        return float(self.alike.S[rank - 1])
 
 
 def check_crossing(motion: Motion, settings: Settings, state: State) -> None:
@@ -52,26 +56,31 @@ def check_crossing(motion: Motion, settings: Settings, state: State) -> None:
     if not (way > 0 and pace > 0):
         return
 
+    def at(terms: Terms) -> Place:
+        weights = np.diag(1 / np.where(span > 0, span, 1.0) ** 2)
+        return Place(*motion.accelerations(terms), rows_of(weights, terms.G))
+
     def along(sizes: float) -> Place:
         rate = motion.rate(t, q, v) * (sizes * way / pace)
         there = project_positions(motion, t, q + rate, v, acting, span)
         w = project_velocities(motion.terms(t, there, v).of(acting), v)
-        return Place(*motion.accelerations(motion.terms(t, there, w).of(acting)))
+        return at(motion.terms(t, there, w).of(acting))
 
-    here = Place(*motion.accelerations(terms.of(acting)))
+    here = at(terms.of(acting))
     try:
         ahead, behind = along(BESIDE), along(-BESIDE)
-        rank = max(ahead.rows.rank, behind.rows.rank)
+        rank = max(ahead.alike.rank, behind.alike.rank)
         sign = 1 if ahead.apart(rank) > behind.apart(rank) else -1
         near = ahead if sign > 0 else behind
         if not here.apart(rank) < min(NEAR, near.apart(rank) / OPENS):
             return
         beside = [near, *(along(sign * k * BESIDE) for k in range(2, 6))]
-        lost = here.rows.rank < rank or _differs(here, beside, rank, terms.F)
+        lost = here.alike.rank < rank or _differs(here, beside, rank, terms.F)
     except StepFailureError:
-        rank, lost = here.rows.rank, here.apart(here.rows.rank) < NEAR
+        small = (here.alike.S > ROUNDING) & (here.alike.S < NEAR)
+        rank, lost = int(np.flatnonzero(small).max(initial=0)) + 1, bool(small.any())
     if lost:
-        weakest = np.abs(here.rows.U[:, rank - 1])
+        weakest = np.abs(here.alike.U[:, rank - 1])
         names = [system.rows[k].name for k, x in zip(acting, weakest, strict=True) if x > 0.1]
         raise StartFailureError(
             "the start is refused: next to these start values the configuration is singular: the constraints "

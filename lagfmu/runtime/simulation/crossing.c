@@ -19,6 +19,7 @@ static const double FORCES_LOST = 1e-3;  /* of the forces at work: by how much m
 struct CrossingMemory {
     double *y, *rate; /* (solver_width()) beside a start */
     double *sum;      /* (2 m + 3 nv) */
+    double *alike;    /* (masses) of speeds that count by what they move */
 };
 
 static void crossing_layout(Solver *s, Arena *scratch) {
@@ -28,6 +29,7 @@ static void crossing_layout(Solver *s, Arena *scratch) {
     x->y = arena_doubles(scratch, solver_width(s));
     x->rate = arena_doubles(scratch, solver_width(s));
     x->sum = arena_doubles(scratch, 2 * s->system->m + 3 * s->system->nv);
+    x->alike = arena_doubles(scratch, s->system->masses);
 }
 
 Status crossing_factor(Solver *s, double t, const double *y, double off) {
@@ -49,12 +51,29 @@ int crossing_name_rows(Solver *s, Why *text) {
     return count;
 }
 
-/* How far apart as many rows are as are independent; < 0: it is not known. */
+/* What a speed moves, as a size of its dimension: an angle by 1 rad. */
+static double span_of(const Solver *s, int i) {
+    const int dimension = s->system->speed_dimension[i];
+    return dimension == s->system->angles ? 1 : mechanism_largest_alike(s->system, dimension, s->state.span);
+}
+
+/* How far apart as many rows are as are independent, whatever the masses are: a light one between heavy ones is no
+ * crossing.  Each speed counts by what it moves.  < 0: it is not known. */
 static double rows_apart(Solver *s, double t, const double *y) {
+    const System *system = s->system;
     Mechanism *b = &s->stepped;
-    if (!s->state.now.dependent) return crossing_factor(s, t, y, DBL_MIN) == OK ? linear_apart(&b->linear) : -1;
-    if (mechanism_motion(b, segment_instant(s, t), y, y + s->system->nq, s->active) != OK) return -1;
-    return linear_furthest_apart(&b->linear);
+    double *alike = s->part.crossing->alike;
+    if (mechanism_evaluate(b, segment_instant(s, t), y, y + system->nq) != OK) return -1;
+    for (int e = 0; e < system->masses; e++) {
+        const int i = system->mass_row[e];
+        const double span = span_of(s, i);
+        alike[e] = i != system->mass_column[e] || !(b->M[e] > 0) ? 0 : span > 0 ? 1 / (span * span) : 1;
+    }
+    b->linear.off = s->state.now.dependent ? 0 : DBL_MIN;
+    const Status status = linear_factor(&b->linear, alike, b->G, s->state.now.dependent ? s->active : solver_rows(s));
+    b->linear.off = 0;
+    if (status != OK) return -1;
+    return s->state.now.dependent ? linear_furthest_apart(&b->linear) : linear_apart(&b->linear);
 }
 
 /* y (states) <- as the motion would be had it gone on, at the same t, by so many sizes of what it moves through. */
@@ -63,8 +82,7 @@ static Status go_beside(Solver *s, double t, double sizes, double *y) {
     Mechanism *b = &s->stepped;
     double *rate = s->part.crossing->rate, fastest = 0;
     for (int i = 0; i < s->system->nv; i++) {
-        const int dimension = s->system->speed_dimension[i];
-        const double span = dimension == s->system->angles ? 1 : mechanism_largest_alike(s->system, dimension, s->state.span);
+        const double span = span_of(s, i);
         if (span > 0) fastest = fmax(fastest, fabs(s->state.v[i]) / span);
     }
     state_gather(s->system, s->state.q, s->state.v, y);
