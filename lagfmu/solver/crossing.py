@@ -30,9 +30,9 @@ LOST = 1e-3  # of the forces at work: lambda that differs by more has lost its d
 
 
 class Place(NamedTuple):
-    """Accelerations (nv), multipliers (m) and decomposed rows at a state on the constraints; `alike`: the same
-    rows whatever the masses are, each speed counting by what it moves, since a light mass between heavy ones is
-    no crossing."""
+    """Accelerations (nv), multipliers (m) and decomposed rows at a state on the constraints; `alike`: these
+    rows whatever the masses are, each speed counting by what it moves, since a light mass between heavy ones
+    is no crossing."""
 
     vdot: Vector
     lam: Vector
@@ -52,13 +52,15 @@ def check_crossing(motion: Motion, settings: Settings, state: State) -> None:
     q, v, t = np.array(state.q), np.array(state.v), state.t
     terms = motion.terms(t, q, v)
     mass, span = np.abs(terms.M.diagonal()), np.array(settings.span)
+    alike = np.array(system.speed_dimension)
+    moves = np.array([span[alike == of].max() for of in alike])
+    moves[(alike == system.angle_dimension) | ~(moves > 0)] = 1.0
     way, pace = np.sqrt(mass @ span**2), np.sqrt(mass @ v**2)
     if not (way > 0 and pace > 0):
         return
 
     def at(terms: Terms) -> Place:
-        weights = np.diag(1 / np.where(span > 0, span, 1.0) ** 2)
-        return Place(*motion.accelerations(terms), rows_of(weights, terms.G))
+        return Place(*motion.accelerations(terms), rows_of(np.diag(1 / moves**2), terms.G))
 
     def along(sizes: float) -> Place:
         rate = motion.rate(t, q, v) * (sizes * way / pace)
