@@ -64,6 +64,8 @@ def opened(fmu: Path) -> Iterator[zipfile.ZipFile]:
         raise VerificationError(f"{str(fmu)!r}: there is no such file")
     try:
         with zipfile.ZipFile(fmu) as archive:
+            if any(i.compress_size > fmu.stat().st_size for i in archive.infolist()):
+                raise zipfile.BadZipFile("a file in it is longer than the archive")
             if problems := _problems(archive.infolist()):
                 raise VerificationError(f"{str(fmu)!r} is not unpacked: {'; '.join(problems)}")
             yield archive

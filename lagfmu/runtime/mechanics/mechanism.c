@@ -53,7 +53,7 @@ static int holds_no_nan(int count, const double *x) { return zero(count, x) == 0
 static Status not_evaluated(Mechanism *b, Instant at, const char *what) {
     Digits t = digits(at.t);
     return fail(b->why,
-                "the equations cannot be evaluated at t = %s s (%s not finite at this state)",
+                "the equations cannot be evaluated at t = %s s (%s not finite at this state: take other inputs, start values or parameters)",
                 t.text, what);
 }
 
