@@ -22,7 +22,7 @@ from functools import lru_cache
 VALUE = "value"  # of a coordinate, an input, a parameter or an output that the model names; or its derivative
 OWN = "own"  # in the variable table: the outputs among these
 MULTIPLIER, UNIQUE, RESIDUAL = "lambda", "unique", "residual"  # of a constraint
-RESIDUAL_RATE = "der(residual)"  # its first or second derivative: G v - nu, G vdot - gamma
+EQUATION = "equation"  # what an importer drives to zero that solves for its multiplier
 FORCE = "Q"  # on a coordinate: of all constraints, or the share of one
 CONTACT, DEPARTURE, CLOSING = "contact", "departure", "closing"
 STICKS, MARGIN, POWER = "sticks", "margin", "power"  # of a friction
@@ -44,13 +44,13 @@ KINETIC, POTENTIAL, TOTAL = "energy.kinetic", "energy.potential", "energy.total"
 DISSIPATED = "energy.dissipated"
 DISSIPATION = "der(energy.dissipated)"
 ENERGY, SOLVER = "energy", "solver"
-RATE = re.compile(r"der\((?!energy\.|residual\.)([\w.]+)(?:,(\d+))?\)")
-OF_RESIDUAL = re.compile(r"der\(residual\.([\w.]+)(?:,(\d+))?\)")
+RATE = re.compile(r"der\((?!energy\.)([\w.]+)(?:,(\d+))?\)")
 SENSITIVITY = "sensitivity"  # of another variable, by a parameter: sensitivity.lambda.rod.by.L
 SENSITIVITY_VALID = "sensitivity.valid"
 BY = ".by."
 ERROR = "error"  # how far off another variable may be: error.lambda.rod
 STEPS = "solver.steps"
+DAE = "solver.dae"  # whether an importer solves for the multipliers
 TIME, INDICATOR, CLOCK = "time", "indicator", "clock"  # what FMI 3.0 has variables for, besides
 FOLLOWS = "unless another start is set"  # ends the description of a start that is an expression
 METHOD, TOLERANCE, STEP = "solver.method", "solver.tolerance", "solver.step"
@@ -212,8 +212,6 @@ def name(quantity: str, constraint: str = "", coordinate: str = "", order: int =
     """The name of what a `Subject` with these fields is."""
     if quantity in (VALUE, OWN):
         return derivative(coordinate, order)
-    if quantity == RESIDUAL_RATE:
-        return derivative(name(RESIDUAL, constraint), order)
     head, _, tail = quantity.partition(".")
     if quantity == SENSITIVITY:
         return f"{head}.{_structured(coordinate)}{BY}{_structured(constraint)}"
@@ -258,8 +256,6 @@ def read(text: str) -> Subject:
     """What a variable of that name is of."""
     if found := RATE.fullmatch(text):
         return Subject(VALUE, "", found[1], int(found[2] or 1))
-    if found := OF_RESIDUAL.fullmatch(text):
-        return Subject(RESIDUAL_RATE, found[1], "", int(found[2] or 1))
     head, *rest = text.split(".")
     if text == DISSIPATION or (head in (ENERGY, SOLVER) and len(rest) == 1):
         return Subject(text)
@@ -283,7 +279,7 @@ def read(text: str) -> Subject:
         return Subject(head, rest[0], rest[1])
     if head == FORCE and rest:
         return Subject(head, "", ".".join(rest))
-    if head in OF_ONE and rest:
+    if head in (*OF_ONE, EQUATION) and rest:
         return Subject(head, ".".join(rest))
     return Subject(VALUE, "", text)
 

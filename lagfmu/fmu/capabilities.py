@@ -56,7 +56,7 @@ def offers_exchange(prepared: Prepared) -> bool:
 def interfaces_of(prepared: Prepared, face: Face) -> dict[str, dict[str, str]]:
     """ModelExchange, where it is offered, and CoSimulation, with their attributes."""
     scene, system = prepared.scene, prepared.system
-    differentiable = scene.differentiable and not system.frictions
+    differentiable = (scene.differentiable and not system.frictions) or face.dae
     provided = dict.fromkeys(DERIVATIVES[face.fmi], str(differentiable).lower())
     common = {"modelIdentifier": scene.name, **COMMON[face.fmi], **provided}
     order = {"maxOutputDerivativeOrder": "1" if differentiable else "0"}

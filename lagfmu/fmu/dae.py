@@ -1,17 +1,17 @@
 """The manifest of the layered standard for differential-algebraic equations, and of what it cannot be had.
 
-FMI-LS-DAE, a draft, as it stands in modelica/fmi-ls-dae at 888556f (April 2026), chapter "Layered Standard
-Manifest File": its text describes `AlgebraicVariables` and `ModelStructure` with `Residual` and
-`Formulation`, its schema nothing but an empty element of another name.  What is written here follows the
-text.
+FMI-LS-DAE 1.0.0-alpha.1 (September 2026).  Its `ModelStructure` stands in the place of that of
+modelDescription.xml while the structural parameter `EnableDAEParameter` is true.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import logging
+from collections.abc import Mapping
 from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .. import names
 from ..errors import ModelError
@@ -22,15 +22,14 @@ from ..prepare.prepare import Prepared
 from .capabilities import offers_exchange
 from .described import Unknown, as_text, structure_of
 
+LOG = logging.getLogger("lagfmu")
 STANDARD = "org.fmi-standard.fmi-ls-dae"
 MANIFEST = f"extra/{STANDARD}/fmi-ls-manifest.xml"
-NAMESPACE = "http://fmi-standard.org/fmi-ls-manifest"
 HEAD = {
-    "xmlns": NAMESPACE,
-    "xmlns:fmi-ls": NAMESPACE,
+    "xmlns:fmi-ls": "http://fmi-standard.org/fmi-ls-manifest",
     "fmi-ls:fmi-ls-name": STANDARD,
-    "fmi-ls:fmi-ls-version": "0.0.1",
-    "fmi-ls:fmi-ls-description": "Layered standard for DAE support in FMI",
+    "fmi-ls:fmi-ls-version": "1.0.0-alpha.1",
+    "fmi-ls:fmi-ls-description": "Layered standard for differential-algebraic equations",
 }
 SINGULAR = 1e-12  # of masses that are scaled to 1: the least eigenvalue that is none
 
@@ -51,86 +50,101 @@ def check_dae(prepared: Prepared) -> None:
         )
     elif not system.rows:
         problems.append("--dae: there is no constraint, and no multiplier to solve for")
-    contacts = [system.rows[k].name for k in system.contacts]
-    for kind, known, remedy in (
-        ("contact", contacts, "hold it closed (--contacts) or leave it out"),
-        ("friction", [f.name for f in system.frictions], "leave it out"),
-    ):
-        for name in known:
-            problems.append(
-                f"--dae: the {kind} {name!r} switches its equations, and an importer that solves for their "
-                f"multipliers does not know when: {remedy}"
-            )
-    for name in found.redundant:
+    if found.redundant and system.frictions:
         problems.append(
-            f"--dae: the constraint {name!r} follows from others, so that G M^-1 G^T is singular and the "
-            "multipliers have no one value: leave it out"
+            f"--dae: the constraints {', '.join(map(repr, found.redundant))} follow from others, and the "
+            "frictions share in their multipliers, which have no one value: leave them out"
         )
     problems += _massless(prepared)
     problems += [
         f"--dae: {name!r} is not among the outputs of the scene: ask for it too (--outputs)"
         for row in system.rows
-        for quantity in (names.MULTIPLIER, names.RESIDUAL)
-        if (name := names.name(quantity, row.name)) not in prepared.table
+        if (name := names.name(names.MULTIPLIER, row.name)) not in prepared.table
     ]
     if problems:
         raise ModelError(prepared.model.name, problems)
+    if found.redundant:
+        LOG.info(
+            "--dae: %s follow from others: in DAE mode lambda of as many is 0, the others bear the forces",
+            ", ".join(map(repr, found.redundant)),
+        )
+
+
+def _masses(prepared: Prepared) -> tuple[NDArray[np.float64], ...]:
+    """M, F and G where it begins."""
+    begun = prepared.structure.start
+    u, p = posed(prepared).values
+    M, F, G, *_ = prepared.examined.assemble(0.0, begun.q, begun.v, [*u, *begun.switch_states], p)
+    return M, F, G
 
 
 def _massless(prepared: Prepared) -> list[str]:
     """What has no mass of its own where it begins."""
-    system, begun = prepared.examined, prepared.structure.start
     if prepared.formulation != "multipliers":
         return []
-    u, p = posed(prepared).values
-    M, *_ = system.assemble(0.0, begun.q, begun.v, [*u, *begun.switch_states], p)
+    M, *_ = _masses(prepared)
     scale = np.sqrt(np.maximum(np.diag(M), 0.0))
-    bare = [name for name, size in zip(system.speeds, scale, strict=True) if not size > 0]
+    speeds = prepared.examined.speeds
+    bare = [name for name, size in zip(speeds, scale, strict=True) if not size > 0]
     if not bare and np.linalg.eigvalsh(M / np.outer(scale, scale))[0] <= SINGULAR:
-        bare = list(system.speeds)
+        bare = list(speeds)
     return [
         f"--dae: M is singular ({', '.join(bare)}), and M^-1 (F + G^T lambda) does not exist: give every "
         "coordinate a mass of its own"
     ] * bool(bare)
 
 
+def multiplier_sizes(prepared: Prepared) -> dict[str, float]:
+    """What each multiplier is like: it holds back what forces at the start, or the motion in its own time,
+    would accelerate,  G a / G M^-1 G^T."""
+    begun = prepared.structure.start
+    M, F, G = _masses(prepared)
+    pulled = np.abs(np.linalg.solve(M, F))
+    moved = np.asarray(begun.span) * begun.rate**2
+    gives = np.einsum("ki,ki->k", G, np.linalg.solve(M, G.T).T)
+    sizes = np.maximum(np.abs(G) @ pulled, np.abs(G) @ moved) / np.where(gives > 0, gives, np.inf)
+    rows = [names.name(names.MULTIPLIER, row.name) for row in prepared.system.rows]
+    return dict(zip(rows, sizes.tolist(), strict=True))
+
+
 def manifest(prepared: Prepared) -> bytes:
     """The bytes of MANIFEST, of what as_built() has made with `dae`."""
     table = prepared.table
-    root = Element("fmiLayeredStandardManifest", HEAD)
+    root = Element("fmiDAEManifest", HEAD)
+    places = table.position
+    SubElement(root, "EnableDAEParameter", {"valueReference": str(places[names.DAE])})
     listed = SubElement(root, "AlgebraicVariables")
     for row in prepared.system.rows:
         name = names.name(names.MULTIPLIER, row.name)
-        SubElement(listed, "AlgebraicVariable", {"valueReference": str(table.position[name])})
+        SubElement(listed, "AlgebraicVariable", {"valueReference": str(places[name])})
     _structure(root, table, known_with_multipliers(prepared.coded, table))
     return as_text(root)
 
 
-def _structure(root: Element, table: VariableTable, known: Mapping[str, Sequence[str]]) -> None:
+def _structure(
+    root: Element, table: VariableTable, known: Mapping[str, tuple[str, ...] | None]
+) -> None:
     """That of modelDescription.xml where the multipliers are known, with the residuals."""
     parent, found, places = SubElement(root, "ModelStructure"), structure_of(table), table.position
-
-    def put(element: Element, kind: str, u: Unknown, **more: str) -> None:
-        reference = {"valueReference": str(places[u.name])}
-        SubElement(element, kind, reference | more | u.attributes(places))
-
     told = found.entries > 0  # of large mechanisms they are left out
 
+    def put(kind: str, u: Unknown) -> None:
+        reference = {"valueReference": str(places[u.name])}
+        SubElement(parent, kind, reference | u.attributes(places))
+
     def of(name: str) -> Unknown:
-        return Unknown(name, known[name] if told and name in known else None)
+        if told and (members := table[name].members):
+            behind = (known[m] or () for m in members)
+            return Unknown(name, list(dict.fromkeys(n for group in behind for n in group)))
+        return Unknown(name, known.get(name) if told else None)
 
     for u in found.outputs:
-        put(parent, "Output", of(u.name))
+        put("Output", of(u.name))
     for u in found.derivatives:
-        put(parent, "ContinuousStateDerivative", of(u.name))
+        put("ContinuousStateDerivative", of(u.name))
     for u in found.initial:
-        put(parent, "InitialUnknown", u)
+        put("InitialUnknown", u)
     for v in table.those(names.INDICATOR):
-        put(parent, "EventIndicator", Unknown(v.name, v.depends))
-    for v in table.those(names.RESIDUAL):
-        if v.members:
-            continue
-        rates = [u for u in table.those(names.RESIDUAL_RATE) if u.of.constraint == v.of.constraint]
-        residual = SubElement(parent, "Residual")
-        for index, one in zip(range(len(rates) + 1, 0, -1), (v, *rates), strict=True):
-            put(residual, "Formulation", of(one.name), index=str(index))
+        put("EventIndicator", of(v.name))
+    for v in table.those(names.EQUATION):
+        put("Residual", of(v.name))

@@ -131,12 +131,14 @@ def sources_of(prepared: Prepared, listed: bool = True, face: Face = USUAL) -> S
     everything = {f: text for f, text in runtime_files().items() if face.holds(f)}
     integrators = held(scene, form)
     measured, joints = bool(table.measured), bool(form.joint_coordinates)
-    tangents = needs_tangents(scene, system)
+    tangents = needs_tangents(scene, system, face.dae)
     model = model_source(form, tangents, frozenset(table.varied), grouped=face.fmi == 3)
     generated = {
         "model.c": model.encode(),
         "variables.c": variables_source(table, form, scene, system).encode(),
-        OPTIONAL: optional_source(scene, system, form, integrators, measured, joints).encode(),
+        OPTIONAL: optional_source(
+            scene, system, form, integrators, measured, joints, face.dae
+        ).encode(),
     }
     if face.fmi == 3:
         inside = arrays(table)

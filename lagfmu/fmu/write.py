@@ -35,7 +35,7 @@ from .archive import pack
 from .capabilities import offers_exchange
 from .closed_forms import pack_closed_forms
 from .compiler import HOST
-from .dae import MANIFEST, check_dae, manifest
+from .dae import MANIFEST, check_dae, manifest, multiplier_sizes
 from .described import untold
 from .face import USUAL, Face
 from .target import NATIVE, target_of
@@ -201,6 +201,7 @@ def as_built(prepared: Prepared, target: str, face: Face = USUAL) -> Prepared:
         model, more = prepared.model.name, (exchanged, face.clocks, face.arrays, face.dae)
         if face.dae:
             check_dae(prepared)
+            table = table.with_nominals(_rounded(multiplier_sizes(prepared)))
         table = with_further(table, prepared.system, model, *more)
     return replace(prepared, table=table)
 
@@ -213,8 +214,12 @@ def _nominals(prepared: Prepared) -> dict[str, float]:
     energy = (
         {names.DISSIPATED: _energy(prepared)} if names.DISSIPATED in prepared.table.states else {}
     )
-    found = sizes | rates | energy
-    return {n: float(f"{x:.1e}") for n, x in found.items() if x > SMALLEST_NOMINAL}
+    return _rounded(sizes | rates | energy)
+
+
+def _rounded(sizes: Mapping[str, float]) -> dict[str, float]:
+    """To two digits; what is next to nothing is no size."""
+    return {n: float(f"{x:.1e}") for n, x in sizes.items() if x > SMALLEST_NOMINAL}
 
 
 def _energy(prepared: Prepared) -> float:

@@ -1,5 +1,5 @@
-"""What FMI 3.0 has variables for besides those of the table: time, event indicators, residuals of a DAE,
-clocks, arrays.
+"""What FMI 3.0 has variables for besides those of the table: time, event indicators, the equations of a DAE
+and the parameter that switches to it, clocks, arrays.
 
 They come last, so that all others have the same value references in both versions, and the interface
 answers for them itself: in this order.
@@ -14,7 +14,7 @@ from .. import names
 from ..errors import ModelError
 from ..model.units import SECOND, Unit
 from ..names import Subject
-from ..numeric.system import NONHOLONOMIC, System
+from ..numeric.system import System
 from .table import collisions
 from .variables import Variable, VariableTable
 
@@ -32,8 +32,8 @@ def with_further(
     dae: bool = False,
 ) -> VariableTable:
     """The table with `time`; for model exchange (`exchanged`) with the event indicators of the system; with
-    `dae` the derivatives of all residuals, down to those that hold the multipliers; with `clocks`, one for
-    each contact and friction; with `arrays`, one for each unit of IN_ARRAYS.
+    `dae` an equation for each multiplier, and the parameter that leaves them to the importer; with `clocks`,
+    one for each contact and friction; with `arrays`, one for each unit of IN_ARRAYS.
 
     Raises ModelError, of `model`, if names collide.
     """
@@ -45,7 +45,7 @@ def with_further(
         known += [*table.states, names.TIME]
         more += _indicators(contacts, len(system.switches), frictions, tuple(known))
     if dae:
-        more += _residuals(table, system)
+        more += _equations(table, system)
     if clocks:
         more += [_clock(c, f"each impact, closing and departure of {c}") for c in contacts]
         more += [_clock(c, f"each start of sliding and of sticking of {c}") for c in frictions]
@@ -81,16 +81,16 @@ def _indicators(
         yield _of_interface(of, f"event indicator of {text}", depends=known)
 
 
-def _residuals(table: VariableTable, system: System) -> Iterator[Variable]:
-    """G v - nu of what holds positions, then G vdot - gamma of all."""
+def _equations(table: VariableTable, system: System) -> Iterator[Variable]:
+    """Of each multiplier; without a unit, which is that of an acceleration or, where the row does not act, of
+    the multiplier."""
     for row in system.rows:
-        unit = table[names.name(names.RESIDUAL, row.name)].unit
-        orders = 1 if row.kind == NONHOLONOMIC else 2
-        for order in range(1, orders + 1):
-            unit = unit.per_second() if unit is not None else None
-            what = "acceleration" if order == orders else "velocity"
-            of = Subject(names.RESIDUAL_RATE, row.name, "", order)
-            yield _of_interface(of, f"{what} residual of constraint {row.name}", unit=unit)
+        of = Subject(names.EQUATION, row.name)
+        text = f"what vanishes by the multiplier of {row.name}, in the continuous-time mode of DAE mode"
+        yield _of_interface(of, text)
+    text = "true: the importer solves for the multipliers (FMI-LS-DAE)"
+    fields = {"kind": "Boolean", "variability": "fixed", "initial": None, "start": False}
+    yield _of_interface(Subject(names.DAE), text, "structuralParameter", **fields)
 
 
 def _clock(of: str, text: str) -> Variable:

@@ -43,9 +43,10 @@ def optional_source(
     found: tuple[str, ...],
     peaks: bool = False,
     joints: bool = False,
+    dae: bool = False,
 ) -> str:
     """C text that defines OPTIONAL; `found` are the integrators; `peaks`: extremes are kept; `joints`: joint
-    coordinates may be given at the start."""
+    coordinates may be given at the start; `dae`: an importer may solve for the multipliers."""
     contacts = bool(system.contacts or system.frictions)
     menu = {m: m for m in found}
     if AUTO in scene.selectable:
@@ -62,7 +63,7 @@ def optional_source(
         rows += ["    .passage = &PASSAGE,\n"] if not system.frictions else []
     rows += ["    .friction = &FRICTION_EVENTS,\n"] if system.frictions else []
     rows += ["    .variation = &VARIATION,\n"] if scene.sensitivities else []
-    if scene.sensitivities and system.frictions:
+    if (scene.sensitivities or dae) and system.frictions:
         rows.append("    .sliding_along = sliding_along,\n")
     rows += ["    .joints = &JOINT_START,\n"] if joints else []
     what = ", ".join(found) + (", contacts" if contacts else "")
@@ -90,10 +91,10 @@ def _features(names: list[str]) -> str:
     )
 
 
-def needs_tangents(scene: Scene, system: System) -> bool:
+def needs_tangents(scene: Scene, system: System, dae: bool = False) -> bool:
     """True if derivatives of the equations or of a run are offered, or needed by an implicit method; with
-    frictions, of whose force they know nothing, only for those of a run."""
-    if scene.sensitivities:
+    frictions only for those of a run, and where an importer may solve for the multipliers."""
+    if scene.sensitivities or dae:
         return True
     if system.frictions:
         return False

@@ -15,7 +15,7 @@ from ...mechanics.form import Form
 from ...mechanics.joint_coordinates import start_names
 from ...methods import NUMBERS
 from ...model.scene import Scene
-from ...numeric.system import NONHOLONOMIC, System
+from ...numeric.system import System
 from .printer import string
 
 Place = tuple[str, int, int]  # where, index, contact
@@ -99,7 +99,7 @@ def variables_source(table: VariableTable, form: Form, scene: Scene, system: Sys
         method=NUMBERS[scene.method],
         lost=int(names.DISSIPATED in table.states),
         motions="&MOTIONS" if system.prescribed else "NULL",
-        multipliers="&MULTIPLIERS_GIVEN" if table.those(names.RESIDUAL_RATE) else "NULL",
+        multipliers="&MULTIPLIERS_GIVEN" if names.DAE in table else "NULL",
         bars=WITH_BARS if scene.error_bars else NO_BARS,
         derivatives=_columns([str(s) for s in eom.p], states, table.varied),
         peaked=f"(const Variable[]){{\n{''.join(measured)}}}" if measured else "NULL",
@@ -123,6 +123,7 @@ ALONE = {  # where a value lies of which there is one
     names.STEP: "STEP",
     names.MAXIMUM_STEP: "MAXIMUM_STEP",
     names.MAXIMUM_STEPS: "MAXIMUM_STEPS",
+    names.DAE: "DAE",
     names.SENSITIVITY_VALID: "SENSITIVITY_VALID",
     **{kind.quantity: kind.place for kind in names.kinds(names.MODEL)},
 }
@@ -172,10 +173,8 @@ class Places:
             return ALONE[what], 0, NONE
         if what == names.UNIQUE and c in self.unique:
             return "OUTPUT_UNIQUE", self.unique[c], NONE
-        if what == names.RESIDUAL_RATE:
-            k = self.rows[c]
-            last = rate == (1 if self.full.rows[k].kind == NONHOLONOMIC else 2)
-            return "RESIDUAL_ACCELERATION" if last else "RESIDUAL_RATE", k, NONE
+        if what == names.EQUATION:
+            return "EQUATION", self.rows[c], NONE
         if (kind := KINDS.get((what, bool(c and q)))) is not None:
             return kind.place, *self._number(kind.each, c, q)
         if of.head in names.EVENTS:

@@ -1,6 +1,7 @@
-/* algebraic.c -- multipliers that an importer solves for, and the residuals by which it does (algebraic.h).
+/* algebraic.c -- multipliers that an importer solves for, and the equations by which it does (algebraic.h).
  *
- * Whoever solves the equations keeps the state on the constraints too: nothing is stabilized or projected here. */
+ * Between two events whoever solves the equations keeps the state on the constraints: nothing is stabilized or projected
+ * then. */
 #include "algebraic.h"
 
 #include <math.h>
@@ -8,41 +9,94 @@
 
 #include "digits.h"
 #include "exchange.h"
-#include "phase.h"
+#include "friction.h"
 
 static void apply_multipliers(Instance *x) { x->solver.stepped.given = x->imposed ? x->multiplier : NULL; }
 
-static Status multiplier_settable(Instance *x, const Variable *v, double value) {
+static Status dae_settable(Instance *x, const Variable *v, double value) {
     Why *why = &x->solver.why;
-    if (!x->exchange || x->phase != CONTINUOUS)
-        return fail(why,
-                    "'%s' is calculated and can be set in the continuous-time mode of Model Exchange alone, by an "
-                    "importer that solves for it (FMI-LS-DAE)",
+    if (v->place == AT_DAE) {
+        if (value == 0 || x->exchange) return OK;
+        return fail(why, "'%s': in co-simulation the FMU solves for the multipliers itself, DAE mode is for Model Exchange",
                     v->name);
+    }
+    if (!x->dae)
+        return fail(why,
+                    "'%s' is calculated and cannot be set outside of DAE mode (FMI-LS-DAE), which an importer of Model "
+                    "Exchange switches on in configuration mode",
+                    v->name);
+    if (!x->imposed) return fail(why, "'%s' can be set in continuous-time mode alone", v->name);
     if (!isfinite(value))
         return fail(why, "'%s' = %s, expected a finite number", v->name, digits(value).text);
-    if (x->imposed) return OK;
-    if (instance_observe(x) != OK) return FAILED; /* what the others stay at */
-    memcpy(x->multiplier, x->seen.lambda, (size_t)MODEL_SYSTEM->m * sizeof *x->multiplier);
     return OK;
 }
 
-static void set_multiplier(Instance *x, const Variable *v, double value) {
-    x->imposed = 1;
-    x->multiplier[v->index] = value;
-    x->gain = 0;
-    x->version += 1;
+static void state_anew(Instance *x) { x->version += 1; }
+
+static void dae_set(Instance *x, const Variable *v, double value) {
+    if (v->place == AT_DAE) x->dae = value != 0;
+    else
+        x->multiplier[v->index] = value;
+    state_anew(x);
+}
+
+static Status dae_renew(Instance *x) {
+    if (!x->dae) return OK;
+    if (exchange_evaluate(x) != OK) return FAILED;
+    memcpy(x->multiplier, x->solver.stepped.lambda, (size_t)MODEL_SYSTEM->m * sizeof *x->multiplier);
+    return OK;
+}
+
+static void impose(Instance *x, int imposed) {
+    if (x->imposed != imposed) state_anew(x);
+    x->imposed = imposed;
     apply_multipliers(x);
 }
 
-static Status residual_rate(Instance *x, const Variable *v, double *value) {
-    Solver *s = &x->solver;
-    Mechanism *b = &s->stepped;
-    const int k = v->index;
-    if (instance_observe(x) != OK || exchange_multipliers(x) != OK) return FAILED;
-    *value = v->place == AT_RESIDUAL_RATE ? mechanism_slip(b, k, s->state.v)
-                                          : mechanism_row(b, k, b->vdot) - b->gamma[k];
-    return isfinite(*value) ? OK : fail(&s->why, "%s is not finite", v->name);
+static Status dae_give(Instance *x) {
+    if (dae_renew(x) != OK) return FAILED;
+    impose(x, x->dae);
+    return OK;
 }
 
-SHARED_VALUE const Algebraic MULTIPLIERS_GIVEN = {multiplier_settable, set_multiplier, apply_multipliers, residual_rate};
+static void dae_take(Instance *x) { impose(x, 0); }
+
+/* The friction by which alone row k holds, where it slips, and which of its rows that is; -1. */
+static int slipping_of_row(const Mechanism *b, int k, int *r) {
+    const int i = b->system->rows[k].friction - 1;
+    if (i < 0 || !b->friction->loaded[i] || b->friction->stick_slip[i].sticks) return -1;
+    *r = b->system->friction[i].row[0] != k;
+    return i;
+}
+
+/* (m) the rows whose accelerations hold. */
+static const int *acting_rows(const Solver *s) {
+    return s->stepped.friction != NULL ? s->stepped.friction->acting : solver_rows(s);
+}
+
+static Status dae_equation(Instance *x, int k, double *value) {
+    Solver *s = &x->solver;
+    Mechanism *b = &s->stepped;
+    int r;
+    if (instance_observe(x) != OK || exchange_multipliers(x) != OK) return FAILED;
+    if (acting_rows(s)[k]) *value = mechanism_row(b, k, b->vdot) - b->gamma[k];
+    else {
+        const int i = slipping_of_row(b, k, &r);
+        const struct FrictionForces *f = b->friction;
+        *value = b->lambda[k] + (i < 0 ? 0 : friction_sliding(f, i) * f->normal[i] * f->towards[2 * i + r]);
+    }
+    return isfinite(*value) ? OK : fail(&s->why, "the equation of %s is not finite", s->system->rows[k].name);
+}
+
+static double dae_change(const Instance *x, int k) {
+    const Solver *s = &x->solver;
+    const Sensitivity *w = &s->sensitivity;
+    int r;
+    if (!x->imposed) return NAN;
+    if (acting_rows(s)[k]) return sensitivity_acceleration(w, &s->stepped, k);
+    const int i = slipping_of_row(&s->stepped, k, &r);
+    return w->dlambda[k] - (i < 0 ? 0 : w->dpush[2 * i + r]);
+}
+
+SHARED_VALUE const Algebraic MULTIPLIERS_GIVEN = {
+    dae_settable, dae_set, apply_multipliers, dae_renew, dae_give, dae_take, dae_equation, dae_change};

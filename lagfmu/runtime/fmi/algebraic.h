@@ -1,11 +1,14 @@
 /* algebraic.h -- multipliers that an importer solves for (FMI-LS-DAE): a differential-algebraic equation of index 1,
  *
- *   M vdot = F + G^T lambda ,  0 = G vdot - gamma          (hidden in it: 0 = f ,  0 = G v - nu)
+ *   M vdot = F + G^T lambda ,   0 = G vdot - gamma     of each row that acts,
+ *                               0 = lambda + mu N e    of one that slips, s/|s| = e ,
+ *                               0 = lambda             of one that does neither
  *
- * in which lambda is what the importer sets and G vdot - gamma what it drives to zero.
- *
- * Until it sets the first of them in continuous-time mode the instance solves for all, as in any FMU; from then on
- * all are as they were set or, those that were not, as they came out then, until the instance is reset.
+ * in which lambda is what the importer sets in continuous-time mode, once it has switched DAE mode on, by the parameter
+ * at AT_DAE in configuration mode; what it drives to zero is called the equation of a row.  In all other modes the
+ * instance solves for lambda, and so with a state projected and modes found by itself; an event has happened too where
+ * the lambda that the importer came with says so.  Of rows that depend on each other a basis acts, as long as
+ * no event chooses another.
  *
  * All of it is reached by one pointer, NULL in an FMU without. */
 #ifndef LAGFMU_ALGEBRAIC_H
@@ -15,13 +18,19 @@
 #include "linkage.h"
 
 typedef struct {
-    /* May a multiplier be set to the value now?  FAILED: no, and the cause is in x->solver.why. */
+    /* May a multiplier, or AT_DAE, be set to the value now?  FAILED: no, and the cause is in x->solver.why. */
     Status (*settable)(Instance *x, const Variable *v, double value);
     void (*set)(Instance *x, const Variable *v, double value);
     /* x->imposed has been set: to the state of before, or by a reset. */
     void (*apply)(Instance *x);
-    /* der(residual.C), der(residual.C,2): G v - nu, G vdot - gamma. */
-    Status (*residual)(Instance *x, const Variable *v, double *value);
+    /* An event is over: x->multiplier as the instance solves for them; continuous-time mode begins with these. */
+    Status (*renew)(Instance *x);
+    Status (*give)(Instance *x);
+    /* Continuous-time mode ends. */
+    void (*take)(Instance *x);
+    /* The equation of row k, and its change along the direction that was taken last. */
+    Status (*equation)(Instance *x, int k, double *value);
+    double (*change)(const Instance *x, int k);
 } Algebraic;
 
 SHARED const Algebraic MULTIPLIERS_GIVEN;

@@ -106,6 +106,7 @@ int component_initialize(Component *c, const Call *call, int phase) {
 static const char *mode_name(const Component *c) {
     switch (c->instance.phase) {
         case INSTANTIATED: return "instantiated";
+        case CONFIGURATION: return "configuration mode";
         case INITIALIZATION: return "initialization mode";
         case STEP_COMPLETE: return "step complete";
         case STEP_FAILED: return "step failed";

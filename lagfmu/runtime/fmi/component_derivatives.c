@@ -39,7 +39,7 @@ double *component_known(Component *c, const Call *call, const Group *group, unsi
     if (isfinite(change) && place != NULL) return place;
     (void)fail(&text, "%s: a change of '%s' by %s, expected a finite change of a continuous state or an input%s",
                call->name, v->name, digits(change).text,
-               ALGEBRAIC != NULL ? ", or of a multiplier once one has been set" : "");
+               ALGEBRAIC != NULL ? ", or, in the continuous-time mode of DAE mode, of a multiplier" : "");
     (void)component_refuse(c, text.text);
     return NULL;
 }

@@ -24,7 +24,7 @@ const Variable *component_find(Component *c, const Call *call, unsigned referenc
 static int read_value(Component *c, const Call *call, const Variable *v, double *value) {
     if (c->instance.phase & READABLE)
         return instance_get(&c->instance, v, value) == OK ? CALL_OK : component_no_value(c);
-    if (v->role == ROLE_OUTPUT) return component_forbidden(c, call);
+    if (v->role == ROLE_OUTPUT && v->place != AT_DAE) return component_forbidden(c, call);
     *value = instance_setting(&c->instance, v);
     return CALL_OK;
 }

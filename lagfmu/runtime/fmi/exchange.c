@@ -16,12 +16,16 @@
 #include <math.h>
 #include <string.h>
 
+#include "friction.h"
 #include "indicators.h"
 #include "nominals.h"
 #include "optional.h"
 #include "schur.h"
 #include "segment.h"
 
+static const double NEAR = 100, LARGEST_NEAR = 1e-6; /* times the importer's tolerance, and that at most: of the size of a
+                                                      * row, how far its solver carries it that has just let go, ... */
+static const double REBOUNDED = 1e-13;               /* ... and what is rounding of one that has been struck */
 static const double DISPLACEMENT = 6e-6; /* of a size: the cube root of rounding */
 
 void exchange_begin(Instance *x) {
@@ -167,7 +171,7 @@ static Status find_way_back(Instance *x, double *a, double *mu) {
 }
 
 int exchange_leads_back(const Instance *x) {
-    return x->exchange && x->running && !x->imposed && x->solver.system->full == NULL && x->solver.system->m > 0;
+    return x->exchange && x->running && !x->dae && x->solver.system->full == NULL && x->solver.system->m > 0;
 }
 
 Status exchange_lead_back(Instance *x) {
@@ -274,6 +278,18 @@ Status exchange_derivatives(Instance *x, double *derivatives) {
     return OK;
 }
 
+double exchange_limit(const Instance *x, int c) {
+    const Solver *s = &x->solver;
+    const State *state = &s->state;
+    const Latest *left = &state->latest[DEPARTURE], *met = &state->latest[CLOSING];
+    if (!x->dae) return state->gap[c];
+    if (state->armed[c]) return 0;
+    const int parted = left->count[c] > 0 && !(met->count[c] > 0 && met->time[c] > left->time[c]);
+    const double size = mechanism_row_size(&s->stepped, s->system->contact[c], state->span);
+    return parted ? fmax(state->gap[c], NEAR * fmin(x->tolerance, LARGEST_NEAR) * size)
+                  : fmin(state->gap[c], REBOUNDED * size);
+}
+
 Status exchange_indicators(Instance *x, double *indicators) {
     Solver *s = &x->solver;
     Mechanism *b = &s->stepped;
@@ -296,7 +312,58 @@ Status exchange_indicators(Instance *x, double *indicators) {
     }
     for (int c = 0; c < s->system->contacts; c++) {
         const int k = s->system->contact[c];
-        indicators[c] = s->state.closed[c] ? b->lambda[k] : b->f[k] + s->state.gap[c];
+        indicators[c] = s->state.closed[c] ? b->lambda[k] : b->f[k] + exchange_limit(x, c);
     }
     return OK;
+}
+
+/* Of the surface of switch k, by a central difference of it alone; of a floor, of what is left to the next whole
+ * number. */
+static double change_of_surface(const Instance *x, int k, Direction d) {
+    const Solver *s = &x->solver;
+    const System *system = s->system;
+    const int nq = system->nq, inputs = system->inputs;
+    double *q = x->work, *u = x->back + 3 * system->nv + system->m, *h = x->indicators, change = 0, now = 0;
+    const double step = step_along(s, d);
+    if (!(step > 0)) return 0;
+    memcpy(u, x->at.u, (size_t)(inputs + system->switches) * sizeof *u);
+    for (int side = -1; side <= 1; side++) {
+        for (int j = 0; j < nq; j++) q[j] = s->state.q[j] + side * step * d.dq[j];
+        for (int j = 0; j < inputs; j++) u[j] = x->at.u[j] + side * step * d.du[j];
+        system->surfaces(x->at.t + side * step * d.dt, q, u, x->at.p, h);
+        change += side * h[k] / (2 * step);
+        if (side == 0) now = h[k];
+    }
+    if (!system->at_integers[k]) return change;
+    const Range range = OPTIONAL.switches->range(s, k);
+    return now - range.low < range.high - now ? change : -change;
+}
+
+/* Of friction i: of the reserve (held - asked) / (held + asked) of its cone, or of its slip; of its normal force. */
+static double change_of_friction(const Instance *x, int i, int of_normal) {
+    const Mechanism *b = &x->solver.stepped;
+    const Sensitivity *w = &x->solver.sensitivity;
+    const struct FrictionForces *f = b->friction;
+    const StickSlip *mode = &f->stick_slip[i];
+    const Friction *law = &b->system->friction[i];
+    double force[2];
+    if (!f->loaded[i]) return 0;
+    if (of_normal) return mode->sticks || law->gated || law->parts > 1 ? 0 : w->dnormal[i];
+    if (!mode->sticks) return w->dslip[2 * i] * mode->direction[0] + w->dslip[2 * i + 1] * mode->direction[1];
+    const double held = f->mu[2 * i] * f->normal[i], asked = friction_tangential(b, i, b->lambda, force);
+    const double dheld = w->dmu[2 * i] * f->normal[i] + f->mu[2 * i] * w->dnormal[i], dasked = dheld - w->dmargin[i];
+    const double sum = held + asked;
+    return sum > 0 ? 2 * (asked * dheld - held * dasked) / (sum * sum) : 0;
+}
+
+double exchange_change_of_indicator(const Instance *x, int i, Direction d) {
+    const Solver *s = &x->solver;
+    const System *system = s->system;
+    const int of_friction = i - indicators_first_of_frictions(system);
+    if (x->apart) return NAN;
+    if (of_friction >= 0) return change_of_friction(x, of_friction / 2, of_friction % 2);
+    if (i >= system->contacts) return change_of_surface(x, i - system->contacts, d);
+    const int k = system->contact[i];
+    if (!s->state.closed[i]) return s->sensitivity.df[k];
+    return s->stepped.linear.unique[k] ? s->sensitivity.dlambda[k] : NAN;
 }

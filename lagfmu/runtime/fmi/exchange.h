@@ -25,8 +25,14 @@ SHARED Status exchange_lead_back(Instance *x);
 SHARED Status exchange_differentiate(Instance *x, Direction d);
 static inline double exchange_change_of_vdot(const Instance *x, int i) { return x->back[i]; }
 SHARED Status exchange_indicators(Instance *x, double *indicators);
+SHARED double exchange_change_of_indicator(const Instance *x, int i, Direction d); /* NAN: there is none */
 SHARED Status exchange_nominals(Instance *x, double *nominals);
 SHARED int exchange_nominals_news(Instance *x); /* 1, once: they are those of this start, not of the description */
+
+/* An open contact has met where f + this <= 0: the gap within which contacts touch; where an importer solves for
+ * multipliers 0 once it has risen above the limit of before: rounding of a rebound, an error of its solver where it has
+ * departed. */
+SHARED double exchange_limit(const Instance *x, int c);
 
 /* After a step of the importer's integrator; `event`: 1 if the state should be projected. */
 SHARED Status exchange_step_done(Instance *x, int *event);

@@ -11,6 +11,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "algebraic.h"
 #include "feature.h"
 #include "indicators.h"
 #include "losses.h"
@@ -26,7 +27,7 @@ static const double DRIFT_LIMIT = 1e-3; /* residual, relative to a constraint's 
 /* Which rows stand for all from here on. */
 static Status choose_rows(Instance *x) {
     Solver *s = &x->solver;
-    if (s->system->m < 2 || x->imposed) return OK;
+    if (s->system->m < 2) return OK;
     segment_begin(s);
     x->version += 1;
     if (segment_motion_near(s, segment_instant(s, s->state.now.t), s->state.q, s->state.v) != OK) return FAILED;
@@ -59,12 +60,13 @@ static Status drift(Instance *x, double *worst) {
     return OK;
 }
 
-/* Contacts whose indicator is not positive: a closed one pulls, an open one is penetrated and goes
- * further in, or is pulled back in.  x->pull: the accelerations towards them. */
-static Status find_happened(Instance *x, int *any) {
+/* Adds to x->happened, by the motion as it is solved for now: contacts whose indicator is not positive, a closed one
+ * that pulls, an open one that is penetrated and goes further in, or is pulled back in; frictions.  x->pull: the
+ * accelerations towards contacts. */
+static Status add_happened(Instance *x) {
     Solver *s = &x->solver;
     Mechanism *b = &s->stepped;
-    *any = 0;
+    x->version += 1;
     if (exchange_multipliers(x) != OK) return FAILED;
     if (mechanism_residual(b, segment_instant(s, s->state.now.t), s->state.q, b->f) != OK)
         return FAILED;
@@ -73,26 +75,58 @@ static Status find_happened(Instance *x, int *any) {
         const int k = s->system->contact[c];
         x->pull[c] = b->gamma[k] - mechanism_row(b, k, b->vdot);
         if (s->state.closed[c])
-            x->happened[c] = b->lambda[k] <= 0;
+            x->happened[c] |= b->lambda[k] <= 0;
         else
-            x->happened[c] = b->f[k] + s->state.gap[c] <= 0 &&
-                             (mechanism_slip(b, k, s->state.v) < 0 || x->pull[c] > 0);
-        *any |= x->happened[c];
+            x->happened[c] |= b->f[k] + exchange_limit(x, c) <= 0 &&
+                              (mechanism_slip(b, k, s->state.v) < 0 || x->pull[c] > 0);
     }
     if (s->system->frictions == 0) return OK;
     const int first = indicators_first_of_frictions(s->system);
     double *values = x->indicators;
     OPTIONAL.friction->indicators(s, values);
-    for (int i = 0; i < 2 * s->system->frictions; i++) {
-        x->happened[first + i] = values[i] < -indicators_range(s, first + i).slack;
-        *any |= x->happened[first + i];
+    for (int i = 0; i < 2 * s->system->frictions; i++)
+        x->happened[first + i] |= values[i] < -indicators_range(s, first + i).slack;
+    return OK;
+}
+
+/* What has happened; where an importer has solved for multipliers, by these too, for by these it has stopped. */
+static Status find_happened(Instance *x, int *any) {
+    const int count = indicators_count(x->solver.system);
+    Mechanism *b = &x->solver.stepped;
+    memset(x->happened, 0, (size_t)count * sizeof *x->happened);
+    if (x->dae && !x->imposed) {
+        b->given = x->multiplier;
+        const Status added = add_happened(x);
+        b->given = NULL;
+        if (added != OK) return FAILED;
     }
+    *any = 0;
+    if (add_happened(x) != OK) return FAILED;
+    for (int i = 0; i < count; i++) *any |= x->happened[i];
     return OK;
 }
 
 /* The rows that stand for all others are about to depend on each other. */
 static int are_close(const Linear *l) {
     return l->rung != RUNG_SCHUR || schur_of(l)->condition > CLOSE;
+}
+
+/* Where multipliers are given, whether other rows are to stand for all, which is for an event. */
+static Status find_worn(Instance *x, int *worn) {
+    Mechanism *b = &x->solver.stepped;
+    b->given = NULL;
+    x->version += 1;
+    const Status evaluated = exchange_evaluate(x);
+    *worn |= evaluated == OK && are_close(&b->linear);
+    b->given = x->multiplier;
+    x->version += 1;
+    return evaluated;
+}
+
+/* Contacts that have risen above what they were watched with meet at f = 0. */
+static void arm_contacts(Solver *s, const Instance *x) {
+    for (int c = 0; c < s->system->contacts; c++)
+        if (!s->state.closed[c] && s->stepped.f[s->system->contact[c]] > exchange_limit(x, c)) s->state.armed[c] = 1;
 }
 
 /* Whether contacts, frictions or drift ask for an event. */
@@ -102,10 +136,12 @@ static Status judge_step(Instance *x, int *event) {
     int any; /* contacts that should have opened or closed, whatever the importer has seen of it */
     *event = s->system->switches > 0 &&
              OPTIONAL.switches->stale(s, segment_instant(s, s->state.now.t), s->state.q);
-    if (s->system->m == 0 || x->imposed) return OK;
+    if (s->system->m == 0) return OK;
     if (drift(x, &worst) != OK) return FAILED;
-    if (s->state.now.dependent && are_close(&s->stepped.linear) && choose_rows(x) != OK) return FAILED;
+    if (x->imposed && s->state.now.dependent && find_worn(x, event) != OK) return FAILED;
+    if (!x->imposed && s->state.now.dependent && are_close(&s->stepped.linear) && choose_rows(x) != OK) return FAILED;
     if (find_happened(x, &any) != OK) return FAILED;
+    if (x->dae) arm_contacts(s, x);
     if (!any && s->system->frictions > 0) {
         double *y = x->work;
         state_gather(s->system, s->state.q, s->state.v, y);
@@ -155,7 +191,7 @@ static Status project_state(Solver *s) {
 /* The state back onto the rows that act. */
 static Status project(Instance *x) {
     x->version += 1;
-    return x->solver.system->m == 0 || x->imposed ? OK : project_state(&x->solver);
+    return x->solver.system->m == 0 ? OK : project_state(&x->solver);
 }
 
 /* The state has been on the rows: what sticks slips where a motion has been moved away from it. */
@@ -226,11 +262,13 @@ void exchange_hold(Instance *x) {
 
 Status exchange_enter_event(Instance *x) {
     x->held = 0;
+    if (ALGEBRAIC != NULL) ALGEBRAIC->take(x);
     return moving(x, come_back) == OK ? tell_features(x) : FAILED;
 }
 
 Status exchange_event(Instance *x, int *moved) {
     if (moving(x, pass_event) != OK || tell_features(x) != OK) return FAILED;
+    if (ALGEBRAIC != NULL && ALGEBRAIC->renew(x) != OK) return FAILED;
     *moved = x->moved;
     x->moved = 0;
     return exchange_find_gain(x);

@@ -116,7 +116,7 @@ Status exchange_find_gain(Instance *x) {
     double *size = x->work + 2 * (nq + nv);
     const Tried tried = {s, x->work, size, size + nq + nv, size + 2 * (nq + nv)};
     x->gain = 0;
-    if (s->system->m == 0 || x->imposed) return OK;
+    if (s->system->m == 0 || x->dae) return OK;
     segment_begin(s);
     if (move(s, tried.rate) != OK) return FAILED;
     for (int j = 0; j < nq; j++) size[j] = s->state.size[j] > 0 ? s->state.size[j] : 1;

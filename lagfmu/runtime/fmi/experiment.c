@@ -9,6 +9,7 @@
 #include "digits.h"
 #include "exchange.h"
 #include "optional.h"
+#include "phase.h"
 #include "thresholds.h"
 
 Status instance_set_up(Instance *x, const double *tolerance, double start, const double *stop) {
@@ -57,7 +58,11 @@ static Status method_exists(Why *why, const Variable *v, double value) {
 
 Status instance_settable(Instance *x, const Variable *v, double value) {
     Why *why = &x->solver.why;
-    if (ALGEBRAIC != NULL && v->place == AT_LAMBDA) return ALGEBRAIC->settable(x, v, value);
+    if ((x->phase == CONFIGURATION) != (v->place == AT_DAE))
+        return fail(why, v->place == AT_DAE ? "'%s' is a structural parameter: set it in configuration mode"
+                                            : "'%s' is no structural parameter, as those that are set in configuration mode",
+                    v->name);
+    if (ALGEBRAIC != NULL && (v->place == AT_LAMBDA || v->place == AT_DAE)) return ALGEBRAIC->settable(x, v, value);
     if (v->role == ROLE_OUTPUT)
         return fail(why, "'%s' is calculated and cannot be set: set coordinates, speeds, parameters or inputs", v->name);
     if (x->running && v->role != ROLE_INPUT && !is_same(x, v, value))
@@ -83,7 +88,7 @@ Status instance_initialize(Instance *x) {
     if (instance_observe(x) != OK) return FAILED;
     if (x->exchange) exchange_begin(x);
     x->running = 1;
-    return OK;
+    return ALGEBRAIC != NULL ? ALGEBRAIC->renew(x) : OK;
 }
 
 static const double SUMS = 1e-6; /* part of a step by which an importer's sums of times may differ from ours */

@@ -9,6 +9,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "algebraic.h"
+
 #define FMI3_ROW(function, exchange, steps) {#function, exchange, steps},
 SHARED_VALUE const Call FMI3_CALLS[FMI3_CALL_COUNT] = {FMI3_TABLE(FMI3_ROW)};
 
@@ -196,13 +198,12 @@ FMI3(fmi3Status, fmi3Reset)(fmi3Instance instance) {
     return fmi3OK;
 }
 
-/* There is nothing to configure: no structural parameters. */
 FMI3(fmi3Status, fmi3EnterConfigurationMode)(fmi3Instance instance) {
-    (void)component_forbids(instance, FMI3_CALL(fmi3EnterConfigurationMode));
-    return fmi3Error;
+    const Call *call = FMI3_CALL(fmi3EnterConfigurationMode);
+    if (instance != NULL && ALGEBRAIC == NULL) return component_forbidden(instance, call); /* nothing to configure */
+    return component_turn(instance, call, CONFIGURATION);
 }
 
 FMI3(fmi3Status, fmi3ExitConfigurationMode)(fmi3Instance instance) {
-    (void)component_forbids(instance, FMI3_CALL(fmi3ExitConfigurationMode));
-    return fmi3Error;
+    return component_turn(instance, FMI3_CALL(fmi3ExitConfigurationMode), INSTANTIATED);
 }

@@ -91,7 +91,7 @@ static double weigh_sides(const Weights *w, const Sensitivity *changes, const Sy
     return sum;
 }
 
-/* Where nothing is solved for, dvdot and dlambda are 0, but for multipliers that are given. */
+/* Where nothing is solved for, dvdot and dlambda are 0. */
 static Status find_sides(Sensitivity *w, Mechanism *b, Instant at, const double *q, const double *v, Direction d) {
     const System *s = b->system;
     memset(w->dvdot, 0, (size_t)s->nv * sizeof *w->dvdot);
@@ -205,14 +205,15 @@ static Status prepare_sum(Component3 *c, const Sum *sum, const Variable **undefi
     return full == NULL || full->dynamics == NULL ? OK : solve_back(sum, none, &c->full, &x->along, &s->full);
 }
 
-/* Accelerations that lead back onto the constraints: a directional derivative for each known. */
+/* Accelerations that lead back onto the constraints. */
 static int leads_back(const Sum *sum) {
     int any = 0;
     for (size_t k = 0; k < sum->count; k++) any |= VARIABLES[sum->unknowns[k]].place == AT_VDOT;
     return any && exchange_leads_back(sum->x);
 }
 
-static Status change_as_led_back(Component *c, const Sum *sum, Direction d, double *change) {
+/* With them, with frictions, or with multipliers that are given: a directional derivative for each known. */
+static Status change_solved_along(Component *c, const Sum *sum, Direction d, double *change) {
     component_settle(c, d.dt);
     if (instance_differentiate(sum->x, d) != OK) return FAILED;
     *change = find_change(sum, d);
@@ -245,15 +246,11 @@ FMI3(fmi3Status, fmi3GetAdjointDerivative)(fmi3Instance instance, const fmi3Valu
         }
         return fmi3OK;
     }
-    if (MODEL_SYSTEM->frictions > 0) {
-        (void)fail(&x->solver.why, "this FMU has frictions, which have no adjoint");
-        return component_no_value(c);
-    }
-    if (prepare_sum(made, &sum, &undefined) != OK)
+    const int along = x->imposed || MODEL_SYSTEM->frictions > 0 || leads_back(&sum);
+    if (along ? instance_observe_unique(x) != OK : prepare_sum(made, &sum, &undefined) != OK)
         return undefined != NULL ? component_no_derivative(c, call, undefined) : component_no_value(c);
     Direction d = component_no_direction(c);
-    const int led_back = leads_back(&sum);
-    const int grouped = COLUMN_GROUPS != NULL && !x->imposed && !is_mixed(&sum) && !led_back;
+    const int grouped = COLUMN_GROUPS != NULL && !is_mixed(&sum) && !along;
     if (grouped) follow_groups(made, &d);
     for (size_t k = 0; k < nKnowns; k++) {
         double *change = component_known(c, call, &FLOAT64, knowns[k], 1, &d.dt);
@@ -262,8 +259,8 @@ FMI3(fmi3Status, fmi3GetAdjointDerivative)(fmi3Instance instance, const fmi3Valu
         if (!grouped) {
             d = component_no_direction(c);
             *change = 1;
-            const Status status = led_back ? change_as_led_back(c, &sum, d, &sensitivity[k])
-                                           : change_along(made, &sum, d, &sensitivity[k]);
+            const Status status = along ? change_solved_along(c, &sum, d, &sensitivity[k])
+                                        : change_along(made, &sum, d, &sensitivity[k]);
             if (status != OK) return component_no_value(c);
         }
         if (!isfinite(sensitivity[k])) return component_no_derivative(c, call, &VARIABLES[unknowns[0]]);

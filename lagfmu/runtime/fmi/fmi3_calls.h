@@ -25,18 +25,18 @@ enum {
 
 #define FMI3_DISCRETE_ROWS(CALL, Type)               \
     CALL(fmi3Get##Type, FMI3_ANY_X, FMI3_ANY_S)      \
-    CALL(fmi3Set##Type, FMI3_SET_X, FMI3_SET_S)
+    CALL(fmi3Set##Type, FMI3_SET_X | CONFIGURATION, FMI3_SET_S | CONFIGURATION)
 
 /* function, modes of an instance for Model Exchange, of one for co-simulation; 0: none */
 #define FMI3_TABLE(CALL)                                                                  \
-    CALL(fmi3SetDebugLogging, FMI3_ANY_X, FMI3_ANY_S)                                     \
+    CALL(fmi3SetDebugLogging, FMI3_ANY_X | CONFIGURATION, FMI3_ANY_S | CONFIGURATION)     \
     CALL(fmi3EnterInitializationMode, INSTANTIATED, INSTANTIATED)                         \
     CALL(fmi3ExitInitializationMode, INITIALIZATION, INITIALIZATION)                      \
     CALL(fmi3EnterEventMode, CONTINUOUS, STEPPING)                                        \
     CALL(fmi3Terminate, EXCHANGE, FMI3_STEPS)                                             \
-    CALL(fmi3Reset, FMI3_ANY_X, FMI3_ANY_S)                                               \
-    CALL(fmi3EnterConfigurationMode, 0, 0) /* there are no structural parameters */       \
-    CALL(fmi3ExitConfigurationMode, 0, 0)                                                 \
+    CALL(fmi3Reset, FMI3_ANY_X | CONFIGURATION, FMI3_ANY_S | CONFIGURATION)               \
+    CALL(fmi3EnterConfigurationMode, INSTANTIATED, INSTANTIATED)                          \
+    CALL(fmi3ExitConfigurationMode, CONFIGURATION, CONFIGURATION)                         \
     FMI3_TABLE_OF_VALUES(CALL)                                                            \
     CALL(fmi3GetClock, EVENT, EVENT)                                                      \
     CALL(fmi3SetClock, EVENT, EVENT)                                                      \
@@ -79,7 +79,7 @@ enum {
 /* Only a Float64 can be continuous, and exchanged in Intermediate Update Mode. */
 #define FMI3_TABLE_OF_VALUES(CALL)                                             \
     CALL(fmi3GetFloat64, FMI3_ANY_X, FMI3_ANY_S | BETWEEN)                     \
-    CALL(fmi3SetFloat64, FMI3_SET_X | CONTINUOUS, FMI3_SET_S | BETWEEN)        \
+    CALL(fmi3SetFloat64, FMI3_SET_X | CONTINUOUS | CONFIGURATION, FMI3_SET_S | BETWEEN | CONFIGURATION) \
     FMI3_DISCRETE_ROWS(CALL, Float32) \
     FMI3_DISCRETE_ROWS(CALL, Int8) \
     FMI3_DISCRETE_ROWS(CALL, UInt8) \

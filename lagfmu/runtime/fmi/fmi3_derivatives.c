@@ -30,8 +30,10 @@ static const unsigned *find_list(Component *c, const Call *call, fmi3ValueRefere
     const unsigned *lists = c->instance.running ? RUNNING_LISTS : INITIAL_LISTS;
     const int known = reference < (unsigned)VARIABLE_COUNT;
     Why text;
-    if (DEPENDENCIES_TOLD && known && lists[reference] > 0) return list_at(lists[reference]);
-    if (!DEPENDENCIES_TOLD)
+    if (DEPENDENCIES_TOLD && known && lists[reference] > 0 && !c->instance.dae) return list_at(lists[reference]);
+    if (c->instance.dae)
+        (void)fail(&text, "%s: in DAE mode the manifest of FMI-LS-DAE says what a variable depends on", call->name);
+    else if (!DEPENDENCIES_TOLD)
         (void)fail(&text, "%s: this FMU is too large to say what its variables depend on, as modelDescription.xml "
                    "does not: take each to depend on all states and inputs", call->name);
     else if (known)

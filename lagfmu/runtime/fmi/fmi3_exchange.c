@@ -1,10 +1,16 @@
 /* fmi3_exchange.c -- Model Exchange (section 3.2). */
+#include "algebraic.h"
 #include "exchange.h"
 #include "fmi3_component.h"
 #include "indicators.h"
 
 FMI3(fmi3Status, fmi3EnterContinuousTimeMode)(fmi3Instance instance) {
-    return component_turn(instance, FMI3_CALL(fmi3EnterContinuousTimeMode), CONTINUOUS);
+    const Call *call = FMI3_CALL(fmi3EnterContinuousTimeMode);
+    Component *c = instance;
+    if (component_forbids(c, call)) return fmi3Error;
+    if (ALGEBRAIC != NULL && ALGEBRAIC->renew(&c->instance) != OK) return component_failed(c, fmi3Error);
+    if (component_turn(c, call, CONTINUOUS) != CALL_OK) return fmi3Error;
+    return ALGEBRAIC == NULL || ALGEBRAIC->give(&c->instance) == OK ? fmi3OK : component_failed(c, fmi3Error);
 }
 
 FMI3(fmi3Status, fmi3CompletedIntegratorStep)(fmi3Instance instance, fmi3Boolean noSetFMUStatePriorToCurrentPoint,

@@ -44,7 +44,7 @@ void instance_layout(Instance *x, Arena *arena) {
         x->pull = arena_doubles(&scratch, system->contacts);
         observed_layout(&x->seen, &scratch, system);
         x->work = arena_doubles(&scratch, 7 * system_states(system));
-        x->back = arena_doubles(&scratch, 3 * system->nv + system->m + system->inputs);
+        x->back = arena_doubles(&scratch, 3 * system->nv + system->m + system->inputs + system->switches);
         x->set_before = arena_doubles(&scratch, VARIABLE_COUNT);
         x->norm = arena_doubles(&scratch, system->quaternions);
         x->places = arena_doubles(&scratch, system->lookup_count);
@@ -77,13 +77,13 @@ void instance_reset(Instance *x) {
     x->solver.on_demand = 1;
     x->started = x->running = x->warned = x->held = x->weighed = x->moved = x->ticking = 0;
     x->version += 1;
-    x->imposed = x->unsettled = 0;
+    x->dae = x->imposed = x->unsettled = 0;
     instance_settled(x);
     if (ALGEBRAIC != NULL) ALGEBRAIC->apply(x);
     memset(x->shared, 0, (size_t)x->solver.system->frictions * sizeof *x->shared);
     for (int k = 0; k < VARIABLE_COUNT; k++)
-        if (VARIABLES[k].type == TYPE_REAL &&
-            (VARIABLES[k].role != ROLE_OUTPUT || VARIABLES[k].place == AT_INPUT))
+        if (VARIABLES[k].place == AT_DAE || (VARIABLES[k].type == TYPE_REAL &&
+            (VARIABLES[k].role != ROLE_OUTPUT || VARIABLES[k].place == AT_INPUT)))
             instance_set(x, &VARIABLES[k], VARIABLES[k].start);
     memset(x->set, 0, (size_t)x->solver.system->inputs * sizeof *x->set);
 }

@@ -43,7 +43,8 @@ typedef struct {
     N(int, moved, FLAG, "whether an event has moved the states")   /* in model exchange, since this was told */       \
     N(int, ticking, FLAG, "whether clocks tick")              /* 1: an event of this instant has been met, and not yet
                                                                * what follows from it */                              \
-    N(int, imposed, FLAG, "multipliers")                      /* 1: an importer solves for them (algebraic.h) */
+    N(int, dae, FLAG, "DAE mode")                             /* 1: an importer solves for multipliers (algebraic.h), ... */ \
+    N(int, imposed, FLAG, "multipliers")                      /* ... and they are now as it has set them */
 
 typedef struct Instance {
     Solver solver;
@@ -66,7 +67,7 @@ typedef struct Instance {
     double *multiplier;     /* (m) those that an importer has set */
     double *places;         /* (lookup_count) scratch */
     double *work;           /* (7 states) of exchange.c, exchange_events.c and exchange_gain.c */
-    double *back;           /* (3 nv + m + inputs) of exchange.c: changes of vdot, what leads back onto the constraints */
+    double *back;           /* (3 nv + m + inputs + switches) of exchange.c: changes of vdot, what leads back onto the constraints */
     double *set_before;     /* (VARIABLE_COUNT) of component_initial.c */
     double *norm;           /* (quaternions) of those that an importer has set, before they were settled */
     int apart;              /* 1: along the direction accelerations change, but no multipliers satisfy all constraints */

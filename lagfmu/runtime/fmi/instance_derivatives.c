@@ -4,6 +4,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "algebraic.h"
 #include "exchange.h"
 #include "outputs.h"
 #include "prescribed.h"
@@ -88,10 +89,10 @@ Status instance_change(const Instance *x, const Variable *v, Direction d, double
     }
     switch (v->place) {
         PLACES_READY(CHANGES) PLACES_OBSERVED(CHANGES)
-        case AT_RESIDUAL_RATE: *change = sensitivity_slip(w, b, i, o->v, dv); break;
-        case AT_RESIDUAL_ACCELERATION: *change = sensitivity_acceleration(w, b, i); break;
+        case AT_EQUATION: *change = ALGEBRAIC->change(x, i); break;
+        case AT_INDICATOR: *change = exchange_change_of_indicator(x, i, d); break;
         case AT_INPUT: *change = d.du[v->index]; break;
-        case AT_ERROR: case AT_INDICATOR: case AT_SENSITIVITY: *change = NAN; break; /* it is not known, or not asked for */
+        case AT_ERROR: case AT_SENSITIVITY: *change = NAN; break; /* it is not known, or not asked for */
         default: break; /* discrete ones and parameters: none */
     }
     return isfinite(*change) ? OK : FAILED;

@@ -14,6 +14,7 @@ int instance_was_set(const Instance *x, const Variable *v, double *value) {
         case AT_MAXIMUM_STEP: *value = x->given.maximum_step; return 1;
         case AT_MAXIMUM_STEPS: *value = x->given.maximum_steps; return 1;
         case AT_INPUT: *value = s->drive.value[v->index]; return 1;
+        case AT_DAE: *value = x->dae; return 1;
         default: return 0;
     }
 }
@@ -79,7 +80,7 @@ static void set_input_or_start(Instance *x, int k, double value) {
 
 void instance_set(Instance *x, const Variable *v, double value) {
     instance_unfollow(x);
-    if (v->place == AT_LAMBDA) { /* of an importer that solves for it */
+    if (v->place == AT_LAMBDA || v->place == AT_DAE) { /* of an importer that solves for it */
         ALGEBRAIC->set(x, v, value);
         return;
     }

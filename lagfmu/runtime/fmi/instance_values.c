@@ -127,7 +127,7 @@ Status instance_get(Instance *x, const Variable *v, double *value) {
     }
     if (!estimated && instance_was_set(x, v, value)) return OK;
     if (v->place == AT_ERROR) return ERROR_BARS->get(x, v, value);
-    if (v->place == AT_RESIDUAL_RATE || v->place == AT_RESIDUAL_ACCELERATION) return ALGEBRAIC->residual(x, v, value);
+    if (v->place == AT_EQUATION) return ALGEBRAIC->equation(x, v->index, value);
     if (v->place == AT_INDICATOR) return indicator(x, v->index, value);
     if (solver_arrive(&x->solver) != OK) return FAILED;
     if (follow(x) != OK) return FAILED;

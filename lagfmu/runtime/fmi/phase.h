@@ -13,6 +13,7 @@ enum {
     CONTINUOUS = 32,
     TERMINATED = 64,
     BETWEEN = 128, /* within a communication step: never saved */
+    CONFIGURATION = 256, /* nor this one, in which structural parameters are set */
     STEPPING = STEP_COMPLETE | STEP_FAILED,
     EXCHANGE = EVENT | CONTINUOUS,
     READABLE = INITIALIZATION | STEPPING | EXCHANGE | TERMINATED | BETWEEN, /* whatever there is */

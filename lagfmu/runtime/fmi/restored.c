@@ -119,7 +119,8 @@ static Status together(Instance *x) {
     const Solver *s = &x->solver;
     if (x->running && !x->started) return restored_none(x, "mode", x->running);
     if (x->held && !(x->exchange && x->running)) return restored_none(x, "discrete values", 1);
-    if (x->imposed && !(ALGEBRAIC != NULL && x->exchange && x->running)) return restored_none(x, "multipliers", 1);
+    if (x->dae && !(ALGEBRAIC != NULL && x->exchange)) return restored_none(x, "DAE mode", 1);
+    if (x->imposed && !(x->dae && x->running)) return restored_none(x, "multipliers", 1);
     if (x->warned < 0) return restored_none(x, "mode", x->warned); /* bits of what has been told */
     if (!offered(x->given.method)) return restored_none(x, "given method", (double)x->given.method);
     if (x->started && !offered(s->settings.method))

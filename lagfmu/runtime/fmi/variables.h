@@ -47,7 +47,7 @@ typedef enum { ROLE_PARAMETER, ROLE_START, ROLE_INPUT, ROLE_SOLVER, ROLE_OUTPUT 
 #define PLACE_READ(place, value, change) AT_##place,
 typedef enum {
     PLACES_SET(PLACE) PLACES_READY(PLACE_READ) PLACES_OBSERVED(PLACE_READ)
-    AT_RESIDUAL_RATE, AT_RESIDUAL_ACCELERATION, /* G v - nu, G vdot - gamma (algebraic.h) */
+    AT_DAE, AT_EQUATION, /* whether an importer solves for multipliers, and what it drives to zero (algebraic.h) */
     PLACES_OF_EVENT(PLACE, DEPARTURE) PLACES_OF_EVENT(PLACE, CLOSING) PLACES_OF_EVENT(PLACE, SLIPPING)
     PLACES_OF_EVENT(PLACE, STICKING)
     AT_PEAK_MAX, AT_PEAK_MIN, AT_PEAK_MAX_TIME, AT_PEAK_MIN_TIME, /* number of the quantity */

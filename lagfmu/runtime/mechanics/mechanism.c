@@ -109,7 +109,7 @@ Status mechanism_motion(Mechanism *b, Instant at, const double *q, const double 
                         const int *active) {
     evaluate_functions(b, at, q, v);
     if (b->given != NULL) {
-        if (motion_given(b) == OK) return OK;
+        if (motion_given(b) == OK && (b->sliding == NULL || b->sliding->given(b, at, q, v, active) == OK)) return OK;
     } else if (b->sliding != NULL) {
         if (b->sliding->motion(b, at, q, v, active) == OK) return OK;
     } else if (linear_factor(&b->linear, b->M, b->G, active) == OK &&

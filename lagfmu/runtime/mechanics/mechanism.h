@@ -37,6 +37,8 @@ typedef struct {
     /* (m) `active` with the rows that stick by friction */
     const int *(*acting)(Mechanism *b, const int *active);
     Status (*motion)(Mechanism *b, Instant at, const double *q, const double *v, const int *active);
+    /* what frictions do under multipliers that are given, of which vdot has come out */
+    Status (*given)(Mechanism *b, Instant at, const double *q, const double *v, const int *active);
     /* 0: the normal force of friction i is not the only one with the latest motion */
     int (*unique_normal)(Mechanism *b, int i);
 } Sliding;

@@ -46,6 +46,7 @@ void sensitivity_layout(Sensitivity *w, Arena *arena, const System *s) {
     w->dslip = arena_doubles(arena, 2 * s->frictions);
     w->dmargin = arena_doubles(arena, s->frictions);
     w->dpower = arena_doubles(arena, s->frictions);
+    w->dnormal = arena_doubles(arena, s->frictions);
 }
 
 static void right_sides(Sensitivity *w, const Mechanism *b) {

@@ -28,7 +28,7 @@ typedef struct Sensitivity {
     Status (*slide)(struct Sensitivity *w, Mechanism *b, Instant at, const double *q, const double *v, Direction d);
     double *dmu, *dpart_load, *dpart_c; /* (2 frictions), (normal_parts), (normal_rows) */
     double *dpush;                      /* (2 frictions) of tangential multipliers, with their normal forces held */
-    double *dslip, *dmargin, *dpower;   /* (2 frictions), (frictions); found where more is asked than a stage needs */
+    double *dslip, *dmargin, *dpower, *dnormal; /* (2 frictions), (frictions); found where more is asked than a stage needs */
 } Sensitivity;
 
 SHARED void sensitivity_layout(Sensitivity *w, Arena *arena, const System *s);

@@ -258,15 +258,11 @@ static void rest(Mechanism *b, const double *v) {
     memset(b->vdot, 0, (size_t)nv * sizeof *b->vdot);
 }
 
-static Status motion_with_friction(Mechanism *b, Instant at, const double *q, const double *v,
-                                   const int *active) {
-    const System *s = b->system;
+/* Slips, and which way those go that do not stick; whether one sticks. */
+static int find_slips(Mechanism *b, const double *v) {
     struct FrictionForces *f = b->friction;
     int sticking = 0;
-    if (find_coefficients(b, at, q, v) != OK) return FAILED;
-    if (linear_factor(&b->linear, b->M, b->G, acting(b, active)) != OK) return FAILED;
-    if (linear_solve(&b->linear, b->F, b->gamma, b->vdot, b->lambda) != OK) return FAILED;
-    for (int i = 0; i < s->frictions; i++) {
+    for (int i = 0; i < b->system->frictions; i++) {
         f->normal[i] = f->reserve[i] = f->held[i] = 0;
         friction_slip(b, i, v, f->slip + 2 * i);
         if (!f->loaded[i]) continue;
@@ -274,6 +270,17 @@ static Status motion_with_friction(Mechanism *b, Instant at, const double *q, co
         if (f->stick_slip[i].sticks) continue;
         friction_heading(&f->stick_slip[i], f->slip + 2 * i, f->towards + 2 * i);
     }
+    return sticking;
+}
+
+static Status motion_with_friction(Mechanism *b, Instant at, const double *q, const double *v,
+                                   const int *active) {
+    const System *s = b->system;
+    struct FrictionForces *f = b->friction;
+    if (find_coefficients(b, at, q, v) != OK) return FAILED;
+    if (linear_factor(&b->linear, b->M, b->G, acting(b, active)) != OK) return FAILED;
+    if (linear_solve(&b->linear, b->F, b->gamma, b->vdot, b->lambda) != OK) return FAILED;
+    const int sticking = find_slips(b, v);
     const int linear = list_sliding(b, 0, 0), sliding = f->slipping = list_sliding(b, 1, linear);
     if (check_norms(b, at.t) != OK) return FAILED;
     if (sliding > 0 && solve_sliding(b, at.t, linear, sliding) != OK) return FAILED;
@@ -284,8 +291,23 @@ static Status motion_with_friction(Mechanism *b, Instant at, const double *q, co
     return OK;
 }
 
+static Status under_given(Mechanism *b, Instant at, const double *q, const double *v, const int *active) {
+    struct FrictionForces *f = b->friction;
+    if (find_coefficients(b, at, q, v) != OK) return FAILED;
+    (void)acting(b, active);
+    if (find_slips(b, v)) find_reserves(b);
+    f->slipping = list_sliding(b, 1, list_sliding(b, 0, 0));
+    for (int g = 0; g < f->slipping; g++) {
+        const int i = f->sliding[g], norms = b->system->friction[i].parts > 1;
+        f->held[i] = f->stick_slip[i].held;
+        f->normal[i] = norms ? friction_norms(b, i, 1, b->lambda) : f->stick_slip[i].sign * friction_normal(b, i, b->lambda);
+    }
+    for (int i = 0; i < b->system->frictions; i++) friction_tangential(b, i, b->lambda, f->tangential + 2 * i);
+    return OK;
+}
+
 static int unique_normal(Mechanism *b, int i) {
     return !b->friction->loaded[i] || normal_is_unique(b, i);
 }
 
-SHARED_VALUE const Sliding SLIDING = {layout_sliding, acting, motion_with_friction, unique_normal};
+SHARED_VALUE const Sliding SLIDING = {layout_sliding, acting, motion_with_friction, under_given, unique_normal};

@@ -86,6 +86,19 @@ static Status solve_along(Sensitivity *w, Mechanism *b, const double *v, Directi
     return OK;
 }
 
+/* The same where multipliers are given, with what their laws then make of those of the frictions that slip in w->dpush. */
+static Status solve_given(Sensitivity *w, Mechanism *b, const double *v, Direction d) {
+    const System *s = b->system;
+    const struct FrictionForces *f = b->friction;
+    for (int g = 0; g < f->slipping; g++) {
+        const int i = f->sliding[g];
+        const double strength = friction_sliding(f, i) * change_of_normal(w, b, i);
+        push_of_held(w, b, i, v, d.dv, w->dpush + 2 * i);
+        for (int r = 0; r < s->friction[i].rows; r++) w->dpush[2 * i + r] -= strength * f->towards[2 * i + r];
+    }
+    return linear_solve(&b->linear, w->b, w->c, w->dvdot, NULL);
+}
+
 /* Are all multipliers the only ones that friction i is made of? */
 static int is_only_one(const Mechanism *b, int i) {
     const System *s = b->system;
@@ -112,7 +125,7 @@ static void find_reported(Sensitivity *w, const Mechanism *b, const double *v, c
             along += force[r] * dforce;
             power += dforce * slip[r] + force[r] * w->dslip[2 * i + r];
         }
-        const double normal = f->loaded[i] ? change_of_normal(w, b, i) : 0;
+        const double normal = w->dnormal[i] = f->loaded[i] ? change_of_normal(w, b, i) : 0;
         w->dmargin[i] = w->dmu[2 * i] * f->normal[i] + f->mu[2 * i] * normal - (length > 0 ? along / length : 0);
         if (!is_only_one(b, i)) w->dmargin[i] = NAN;
         w->dpower[i] = slips ? power : 0;
@@ -123,7 +136,7 @@ Status sliding_along(Sensitivity *w, Mechanism *b, Instant at, const double *q, 
     if (b->friction->slipping > 0 || !b->stage)
         b->system->coulomb_tangent(at.t, q, v, at.u, at.p, d.dt, d.dq, d.dv, d.du, d.dp, w->dmu, w->dpart_load,
                                    w->dpart_c);
-    if (solve_along(w, b, v, d) != OK) return FAILED;
+    if ((b->given != NULL ? solve_given(w, b, v, d) : solve_along(w, b, v, d)) != OK) return FAILED;
     if (!b->stage) find_reported(w, b, v, d.dv);
     return OK;
 }

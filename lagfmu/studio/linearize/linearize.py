@@ -33,7 +33,7 @@ from .result import Linearization
 
 ROUNDING = 1e-14  # part of the largest rate, that is none in A
 DEPENDENT = 1e-9  # likewise where rows depend on each other, whose accelerations the FMU takes differences of
-SKIPPED = (names.RESIDUAL, names.RESIDUAL_RATE, names.SLIP, names.MARGIN, names.POWER)
+SKIPPED = (names.RESIDUAL, names.EQUATION, names.SLIP, names.MARGIN, names.POWER)
 
 
 def linearize(
