@@ -252,13 +252,11 @@ class Linearization:
         return self.A, B, C, D
 
     def to_control(self) -> Any:
-        """control.StateSpace with these names, of python-control (`pip install lagfmu[control]`)."""
+        """control.StateSpace with these names, of python-control (`pip install control`)."""
         try:
             import control  # type: ignore[import-not-found, import-untyped, unused-ignore]
         except ImportError:
-            raise UsageError(
-                "python-control is not installed: pip install lagfmu[control]"
-            ) from None
+            raise UsageError("python-control is not installed: pip install control") from None
         return control.ss(
             *(self.A, self.B, self.C, self.D),
             states=[_plain(n) for n in self.states],
