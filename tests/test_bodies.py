@@ -887,7 +887,7 @@ pin = Revolute("A", ground.at((0, 0)), arm.at((0, 0)))
         ({"read": {"tip": pin}}, "Reading 'tip': at is Revolute("),
         ({"read": {"tip": ground.at((0, 0))}}, "'tip': its marker is on the ground"),
         ({"read": {"arm": arm}}, "'arm' is used twice, by a Body and a Reading"),
-        ({"start": {"angle.B": 1.0}}, "start names 'angle.B', which does not begin anywhere"),
+        ({"start": {"angle.B": 1.0}}, "start names 'angle.B', which has no start of its own"),
         ({"start": {"arm.position": 1.0}}, "start of 'arm.position' is 1.0, expected 2 numbers"),
         ({"start": {"arm.position.x": "left"}}, "is 'left', expected finite numbers"),
     ],

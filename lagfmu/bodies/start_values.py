@@ -81,7 +81,7 @@ def given_values(
         if name not in known and not parts:
             near = difflib.get_close_matches(str(name), [*known, *turns], 1)
             problems.append(
-                f"start names {name!r}, which does not begin anywhere, expected a coordinate, the angle or "
+                f"start names {name!r}, which has no start of its own, expected a coordinate, the angle or "
                 f"the position of a joint, or a rate of these{f'; did you mean {near[0]!r}?' if near else ''}"
             )
         elif not isinstance(values, Sequence) or len(values) != len(parts or values):
