@@ -164,7 +164,7 @@ def test_the_fmu_is_small(native_fmu, built_for):
     for name, most in (("PendulumCartesian", 270e3), ("Hemisphere", 300e3)):
         assert native_fmu(name).stat().st_size < most
     everywhere = built_for("all")
-    assert everywhere.stat().st_size < 860e3
+    assert everywhere.stat().st_size < 900e3
     with zipfile.ZipFile(everywhere) as archive:
         carried = [i for i in archive.infolist() if i.filename.startswith("sources/")]
         here = f"binaries/{host().folder}/Hemisphere{host().suffix}"
@@ -174,7 +174,7 @@ def test_the_fmu_is_small(native_fmu, built_for):
             if i.filename.startswith("binaries/") and i.filename != here
         ]
     sources = sum(i.compress_size for i in carried)
-    assert everywhere.stat().st_size - sources < 680e3
+    assert everywhere.stat().st_size - sources < 710e3
     assert everywhere.stat().st_size - sources - sum(i.compress_size for i in others) < 130e3
 
 
