@@ -53,6 +53,10 @@ STEPS = "solver.steps"
 DAE = "solver.dae"  # whether an importer solves for the multipliers
 TIME, INDICATOR, CLOCK = "time", "indicator", "clock"  # what FMI 3.0 has variables for, besides
 FOLLOWS = "unless another start is set"  # ends the description of a start that is an expression
+VELOCITY_OF = (
+    "velocity of"  # begins the description of the rate of a coordinate, whatever the coordinate is
+)
+MISSED_VELOCITY = "velocity residual"  # likewise of the residual of a constraint of velocities
 METHOD, TOLERANCE, STEP = "solver.method", "solver.tolerance", "solver.step"
 MAXIMUM_STEP, MAXIMUM_STEPS = "solver.maximum_step", "solver.maximum_steps"
 

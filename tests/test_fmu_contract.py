@@ -207,6 +207,7 @@ def test_every_variable_is_described(xml):
     for reference, (variable, (attributes, _, _)) in enumerate(variables(xml).items()):
         assert len(attributes["description"]) > 3
         assert attributes["description"] != variable
+        assert " of: " not in attributes["description"]  # velocity of x
         assert int(attributes["valueReference"]) == reference
 
 

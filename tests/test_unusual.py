@@ -62,7 +62,8 @@ def test_a_parameter_that_stands_nowhere_is_told():
     with pytest.warns(LagfmuWarning) as told:
         show(model)
     assert [str(w.message) for w in told] == [
-        "model 'Spring': parameter 'Re' stands nowhere in the model and changes nothing: leave it out"
+        "model 'Spring': parameter 'Re' stands nowhere in the model and changes no motion: leave it out; a "
+        "closed form that needs it can hold its number"
     ]
 
 

@@ -181,8 +181,8 @@ def _tell(model: Model, given: Mapping[str, float], found: Array, size: float) -
         if abs(is_now - asked) > CLOSED * max(abs(asked), size):
             told = is_now if abs(is_now) > CLOSED * abs(asked) else 0.0
             warnings.warn(
-                f"model {model.name!r}: start of {name} = {asked!r} is {told!r}: the joints cannot be "
-                "closed there",
+                f"model {model.name!r}: the joints do not allow the given start {name} = {asked!r}, alone "
+                f"or with the other given values: the mechanism starts with {name} = {told!r} instead",
                 GivenStartWarning,
                 stacklevel=5,
             )

@@ -121,17 +121,18 @@ class Outputs:
     def _of_coordinate(self, q: Expr, v: Expr, symbols: Names) -> list[Variable]:
         """Itself, its velocity, and its acceleration, behind which are these `symbols`."""
         name = str(q)
-        text = self._text(name, "coordinate")
+        text, what = self._text(name, "coordinate"), self._text(name)
         of = Subject(names.VALUE, "", name, 2)
-        rate = f"acceleration of: {text}"
+        velocity, acceleration = f"{names.VELOCITY_OF} {what}", f"acceleration of {what}"
         return [
             self._moving(Subject(names.VALUE, "", name), text, q, None),
-            self._moving(Subject(names.VALUE, "", name, 1), f"velocity of: {text}", v, name),
-            self.output(of, rate, self.units[of.name], symbols, "Real", str(v)),
+            self._moving(Subject(names.VALUE, "", name, 1), velocity, v, name),
+            self.output(of, acceleration, self.units[of.name], symbols, "Real", str(v)),
         ]
 
-    def _text(self, name: str, kind: str) -> str:
-        return self._texts.get(name, f"{kind} {name}")
+    def _text(self, name: str, kind: str = "") -> str:
+        """What the model says of a coordinate or speed, else its name after its kind."""
+        return self._texts.get(name, f"{kind} {name}".strip())
 
     @cached_property
     def _texts(self) -> dict[str, str]:
@@ -147,18 +148,17 @@ class Outputs:
             of = Subject(names.VALUE, "", str(q), 1)
             if of.name not in speeds:
                 unit, behind = self.units[of.name], self.behind.symbols(rate)
-                text = f"velocity of: {text}"
+                text = f"{names.VELOCITY_OF} {self._text(str(q))}"
                 made = self.output(of, text, unit, behind, "Real", str(q))
                 variables.append(self._startable(made))
         for i, v in enumerate(eom.v):
             of = names.read(str(v))
-            kind, of_what = ("coordinate", of.coordinate) if of.order else ("speed", None)
-            text = self._text(of.coordinate, kind)
-            text = f"velocity of: {text}" if of.order else text
+            what, of_what = self._text(of.coordinate), of.coordinate if of.order else None
+            text = f"{names.VELOCITY_OF} {what}" if of.order else self._text(str(v), "speed")
             variables.append(self._moving(of, text, v, of_what))
             rate = dataclasses.replace(of, order=of.order + 1)
             unit, behind = self.units[rate.name], self.behind.group(speed=i)
-            text = f"rate of: {text}"
+            text = f"acceleration of {what}" if of.order else f"rate of {what}"
             variables.append(self.output(rate, text, unit, behind, "Real", str(v)))
         return variables
 
@@ -214,7 +214,7 @@ class Outputs:
             what = f"constraint {c.name}" + (f": {c.description}" if c.description else "")
             unit, lam, rate = self._units_of(c)
             if isinstance(c, Nonholonomic) or c.name in self.eom.limited:
-                missed, found, unit = "velocity residual", self.behind.rates(k), rate
+                missed, found, unit = names.MISSED_VELOCITY, self.behind.rates(k), rate
             else:
                 missed = (
                     "gap, zero while closed," if isinstance(c, Contact) else "position residual"

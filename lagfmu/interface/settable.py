@@ -85,7 +85,7 @@ def drives(eom: EquationsOfMotion, driven: list[str]) -> list[Variable]:
         estimated = i.rates == "estimated"
         text = i.description or f"input {name}"
         orders = (3 if i in eom.model.prescribed else 1) + (1 if estimated else 0)
-        heads = ("", "rate of: ", "second derivative of: ", "third derivative of: ")
+        heads = ("", "rate of ", "second derivative of ", "third derivative of ")
         starts = (float(i.start), float(i.rate), 0.0, 0.0)
         unit = eom.units[name]
         for order in range(orders):

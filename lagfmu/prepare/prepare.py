@@ -51,7 +51,8 @@ def derive(request: Request) -> Derived:
     if known is None or known.model is not model:
         for name in unused(request.model):
             text = (
-                f"parameter {name!r} stands nowhere in the model and changes nothing: leave it out"
+                f"parameter {name!r} stands nowhere in the model and changes no motion: leave it out; a "
+                "closed form that needs it can hold its number"
             )
             warnings.warn(f"model {model.name!r}: {text}", LagfmuWarning, stacklevel=4)
         known = with_jumps(derive_equations(model))

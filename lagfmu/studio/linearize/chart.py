@@ -101,7 +101,7 @@ def acting(ex: Exchange) -> Rows:
         if slips[row] in described:
             speeds.append(slips[row])
             stuck.append(row)
-        elif described[n].startswith("velocity residual"):
+        elif described[n].startswith(names.MISSED_VELOCITY):
             speeds.append(n)
         else:
             places.append(n)

@@ -36,7 +36,6 @@ ROUNDS = 100  # of the discrete states at one instant
 TYPES = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean"}  # of FMI 3.0
 DIRECTIONAL = re.compile(r'<ModelExchange\b[^>]*\bprovidesDirectionalDerivatives?="true"')
 TELLS = 1e-6  # part of a value over a step, that a change of it is at least, to tell of errors
-OF_COORDINATE = "velocity of: "  # how the description of a coordinate's rate begins
 
 
 class Exchange:
@@ -56,7 +55,7 @@ class Exchange:
         found = [(n, v) for n, v in found if n != names.DISSIPATED]
         self.states, self.rates = [n for n, _ in found], [v.name for _, v in found]
         self.coordinate = np.array(
-            [(v.description or "").startswith(OF_COORDINATE) for _, v in found], dtype=bool
+            [(v.description or "").startswith(names.VELOCITY_OF) for _, v in found], dtype=bool
         )
         self.three = description.fmiVersion != "2.0"
         self.error, self.size = 0.0, np.ones(len(self.states))

@@ -165,7 +165,7 @@ def _speeds(description: Any) -> list[str]:
 def _is_speed(description: Any, name: str) -> bool:
     return any(
         u.variable.derivative.name == name
-        and not (u.variable.description or "").startswith("velocity of: ")
+        and not (u.variable.description or "").startswith(names.VELOCITY_OF)
         for u in description.derivatives
     )
 
