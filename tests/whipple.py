@@ -2,7 +2,9 @@
 
 x points forward, y to the right, z down; the rear wheel's centre is at (x, y, z).  The rear frame turns by
 yaw, lean, pitch; the front frame by steer about an axis that is tilted back; the wheels spin in their frames.
-Parameters are those of the benchmark (Meijaard, Papadopoulos, Ruina & Schwab 2007, Table 1).
+The benchmark: J. P. Meijaard, J. M. Papadopoulos, A. Ruina, A. L. Schwab, Linearized dynamics equations for
+the balance and steer of a bicycle: a benchmark and review, Proc. R. Soc. A 463 (2007), 1955-1982,
+doi:10.1098/rspa.2007.1857.  Table 1 has the parameters, Table 2 the eigenvalues.
 """
 
 from __future__ import annotations
@@ -26,19 +28,21 @@ VALUES = {
     "m/s^2": {"g": 9.81},
 }
 GIVEN = {name: (value, unit.strip()) for unit, of in VALUES.items() for name, value in of.items()}
-# its linear equations about upright motion at v, in (lean, steer): M q'' + v C q' + (g K0 + v^2 K2) q = 0
-M = [[80.81722, 2.31941332208709], [2.31941332208709, 0.29784188199686]]
-K0 = [[-80.95, -2.59951685249872], [-2.59951685249872, -0.80329488458618]]
-K2 = [[0, 76.59734589573222], [0, 2.65431523794604]]
-C = [[0, 33.86641391492494], [-0.85035641456978, 1.68540397397560]]
-AT_5 = [  # m/s: capsize, weave, castering [1/s]
-    -0.32286642900409,
-    complex(-0.77534188219585, 4.46486771378823),
-    complex(-0.77534188219585, -4.46486771378823),
-    -14.07838969279822,
-]
 t = dynamicsymbols._t
 E1, E2, E3 = (eye(3)[:, k] for k in range(3))
+
+
+def pair(real: float, imag: float) -> tuple[complex, complex]:
+    return complex(real, imag), complex(real, -imag)
+
+
+# eigenvalues [1/s] of upright motion at v [m/s]: castering, capsize, weave (at rest four real ones)
+PUBLISHED = {
+    0.0: [-5.53094371765393, -3.13164324790656, 3.13164324790656, 5.53094371765393],
+    2.0: [-8.67387984831735, -3.07158645641514, *pair(2.68234517512745, 1.68066296590675)],
+    5.0: [-14.07838969279822, -0.32286642900409, *pair(-0.77534188219585, 4.46486771378823)],
+    8.0: [-20.27940894394569, 0.14327879765713, *pair(-2.69348683581097, 8.46037971396931)],
+}
 
 
 def speeds(v: float) -> dict[str, float]:
