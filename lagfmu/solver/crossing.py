@@ -3,8 +3,9 @@
 G v = nu holds to rounding, so that speeds are known to eps / s in the direction that the rows tell least, s
 being the smallest singular value of the scaled rows.  gamma is of second order in them, and lambda is gamma
 over s^2: off by eps / s^3, which may be all of it, unless the speeds are those of one branch to the last.
-Nothing at the start tells which; the motion a little further along the branch does.  In the crossing itself a
-row is missing that holds the first step.
+Nothing at the start tells which; the motion a little further along the branch does.  Where that turns too
+sharply to say (cranks that are nearly alike), states that the rows cannot tell from the start do: lambda has
+its digits if they all have it.  In the crossing itself a row is missing that holds the first step.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ BESIDE = 3e-3  # of the motion's size: how far along the branch lambda is looked
 OPENS = 2  # times as large is the singular value there, where it is small at a crossing only
 POLYNOMIAL = 5.0, -10.0, 10.0, -5.0, 1.0  # through so many places: what it is at the start
 LOST = 1e-3  # of the forces at work: lambda that differs by more has lost its digits
+UNSEEN = 1e-14  # of each speed's size, over s: so far moved a state satisfies the rows just as well
 
 
 class Place(NamedTuple):
@@ -62,13 +64,17 @@ def check_crossing(motion: Motion, settings: Settings, state: State) -> None:
     def at(terms: Terms) -> Place:
         return Place(*motion.accelerations(terms), rows_of(np.diag(1 / moves**2), terms.G))
 
-    def along(sizes: float) -> Place:
-        rate = motion.rate(t, q, v) * (sizes * way / pace)
-        there = project_positions(motion, t, q + rate, v, acting, span)
+    def moved(by: Vector) -> Place:
+        there = project_positions(motion, t, q + motion.rate(t, q, by), v, acting, span)
         w = project_velocities(motion.terms(t, there, v).of(acting), v)
         return at(motion.terms(t, there, w).of(acting))
 
+    def along(sizes: float) -> Place:
+        return moved(v * (sizes * way / pace))
+
     here = at(terms.of(acting))
+    if here.alike.S.min() >= NEAR:
+        return
     try:
         ahead, behind = along(BESIDE), along(-BESIDE)
         rank = max(ahead.alike.rank, behind.alike.rank)
@@ -77,7 +83,14 @@ def check_crossing(motion: Motion, settings: Settings, state: State) -> None:
         if not here.apart(rank) < min(NEAR, near.apart(rank) / OPENS):
             return
         beside = [near, *(along(sign * k * BESIDE) for k in range(2, 6))]
-        lost = here.alike.rank < rank or _differs(here, beside, rank, terms.F)
+        lost = here.alike.rank < rank or (
+            _differs(here, beside, POLYNOMIAL, rank, terms.F)
+            and any(
+                _differs(here, [moved(sign * UNSEEN / here.apart(rank) * e)], [1.0], rank, terms.F)
+                for e in np.diag(moves)
+                for sign in (-1, 1)
+            )
+        )
     except StepFailureError:
         small = (here.alike.S > ROUNDING) & (here.alike.S < NEAR)
         rank, lost = int(np.flatnonzero(small).max(initial=0)) + 1, bool(small.any())
@@ -93,8 +106,10 @@ def check_crossing(motion: Motion, settings: Settings, state: State) -> None:
         )
 
 
-def _differs(here: Place, beside: Sequence[Place], rank: int, F: Vector) -> bool:
-    """Are accelerations or multipliers others than those which a polynomial through the places beside says?
+def _differs(
+    here: Place, beside: Sequence[Place], weights: Sequence[float], rank: int, F: Vector
+) -> bool:
+    """Are accelerations or multipliers others than the sum of those at the places beside, by these weights?
 
     Multipliers are smooth along a branch; where something pushes out of it, which they hold by 1 / s of it,
     they are so times s.  Forces count in the metric of 1/M, accelerations in that of M, diag(1 / D^2).
@@ -102,7 +117,7 @@ def _differs(here: Place, beside: Sequence[Place], rank: int, F: Vector) -> bool
     D, length, s = here.rows.D, here.rows.length, here.apart(rank)
     forces = np.concatenate([beside[0].lam * length, here.lam * length, F * D])
     most = LOST * float(np.abs(forces).max())
-    places = list(zip(POLYNOMIAL, beside, strict=True))
+    places = list(zip(weights, beside, strict=True))
     vdot = here.vdot - sum(w * p.vdot for w, p in places)
     lam = here.lam - sum(w * p.lam for w, p in places)
     pushed = here.lam - sum(w * p.lam * p.apart(rank) for w, p in places) / s

@@ -101,8 +101,12 @@ def verify(
         besides = sorted(read & said)
         if stop_time is None:
             stop_time = max((t for one in against if (t := one.stop_time)), default=None)
-        asked = (start_values, inputs)
-        result = simulate(path, stop_time, step_size, tolerance, *asked, besides=besides)
+
+        def run(tolerance: float | None) -> Trajectory:
+            asked = stop_time, step_size, tolerance, start_values, inputs
+            return simulate(path, *asked, besides=besides)
+
+        result = run(tolerance)
         seconds = time.perf_counter() - begun
         used = tolerance or experiment_of(description).tolerance
         values = numbers_of(description)
@@ -112,16 +116,13 @@ def verify(
             names.read(k).head == names.SOLVER for k in start_values or ()
         )
 
-        def held(run: Trajectory) -> list[Check]:
-            found = [check_closed_form(form, run, values, used, as_built) for form in forms]
-            return found + [c for one in against for c in one.checks(run, values)]
-
-        def at(finer: float) -> list[Check]:
-            return held(simulate(path, stop_time, step_size, finer, *asked, besides=besides))
+        def held(result: Trajectory) -> list[Check]:
+            found = [check_closed_form(form, result, values, used, as_built) for form in forms]
+            return found + [c for one in against for c in one.checks(result, values)]
 
         stated = held(result)
         if names.TOLERANCE not in (start_values or {}):
-            stated = _with_cures(stated, used, at)
+            stated = _with_cures(stated, used, lambda finer: held(run(finer)))
     checks = [
         *([Check(VALID, len(problems), 0, 1, "; ".join(problems))] if validation else []),
         _finite(result),
@@ -162,9 +163,9 @@ def _with_cures(
 
 
 def _with_cure(check: Check, then: Check, finer: float) -> Check:
-    if not (check.failed and check.allowed):
-        return check
-    cured = then.points > 0 and then.error <= check.allowed
+    if not (check.failed and check.allowed and then.points > 0):
+        return check  # a finer run that reaches none of its points says nothing of it
+    cured = then.error <= check.allowed
     told = "it holds" if cured else "it fails too"
     told = f"at a tolerance of {finer:.0e} {told} ({then.error:.1e})"
     return replace(check, detail=f"{check.detail}; {told}" if check.detail else told)

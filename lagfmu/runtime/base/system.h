@@ -198,6 +198,9 @@ struct System {
 /* The state that is stepped: y = (q, v), v = y + nq. */
 static inline int system_states(const System *s) { return s->nq + s->nv; }
 
+/* What is read: a system that integrates coordinates of its own reads the full one, with all coordinates and multipliers. */
+static inline const System *system_read(const System *s) { return s->embed != NULL ? s->full : s; }
+
 /* What start values are of: y, then the value and the rate of each joint coordinate. */
 static inline int system_starts(const System *s) { return system_states(s) + 2 * s->joint_count; }
 

@@ -98,13 +98,13 @@ Status exchange_nominals(Instance *x, double *nominals) {
 }
 
 int exchange_flag_count(const Instance *x) {
-    const System *s = x->solver.system, *full = s->embed != NULL ? s->full : s;
+    const System *s = x->solver.system, *full = system_read(s);
     return full->m + full->unique_count + s->frictions;
 }
 
 /* The place of a discrete value that is evaluated at the state; NULL: it is none. */
 static int *flag_of(const Instance *x, const Variable *v) {
-    const System *s = x->solver.system, *full = s->embed != NULL ? s->full : s;
+    const System *s = x->solver.system, *full = system_read(s);
     switch (v->place) {
         case AT_UNIQUE: return x->flag + v->index;
         case AT_OUTPUT_UNIQUE: return x->flag + full->m + v->index;

@@ -251,7 +251,7 @@ static Status tell_features(Instance *x) {
 }
 
 void exchange_hold(Instance *x) {
-    const System *s = x->solver.system, *full = s->embed != NULL ? s->full : s;
+    const System *s = x->solver.system, *full = system_read(s);
     const Observed *o = &x->seen;
     x->held = x->exchange && (full->unique_count > 0 ? instance_observe_unique(x) : instance_observe(x)) == OK;
     if (!x->held) return;

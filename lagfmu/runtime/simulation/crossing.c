@@ -15,9 +15,11 @@ enum { BESIDES = 5 };
 static const double POLYNOMIAL[BESIDES] = {5, -10, 10, -5, 1}; /* through so many places: what it is at the start */
 static const double OPENS = 2;           /* if the angle is so many times as wide there; ... */
 static const double FORCES_LOST = 1e-3;  /* of the forces at work: by how much multipliers may differ */
+static const double ROUNDED = 10;        /* roundings of a row, which its constraint cannot tell from the start */
 
 struct CrossingMemory {
     double *y, *rate; /* (solver_width()) beside a start */
+    double *along;    /* (nv) one speed */
     double *sum;      /* (2 m + 3 nv) */
     double *alike;    /* (masses) of speeds that count by what they move */
 };
@@ -28,6 +30,7 @@ static void crossing_layout(Solver *s, Arena *scratch) {
     if (x == NULL) x = &counted;
     x->y = arena_doubles(scratch, solver_width(s));
     x->rate = arena_doubles(scratch, solver_width(s));
+    x->along = arena_doubles(scratch, s->system->nv);
     x->sum = arena_doubles(scratch, 2 * s->system->m + 3 * s->system->nv);
     x->alike = arena_doubles(scratch, s->system->masses);
 }
@@ -93,13 +96,26 @@ static Status go_beside(Solver *s, double t, double sizes, double *y) {
     return segment_project(s, t, y);
 }
 
-/* Adds part times the multipliers (m), the same times the angle (m), and accelerations (nv), of the motion at `sizes` from
- * the start. */
-static Status add_motion(Solver *s, double t, double sizes, double part, double *sum) {
-    const int m = s->system->m;
-    double *y = s->part.crossing->y;
+/* y (states) <- the start as the rows know it just as well, at the same t: moved along speed i by a rounding of them over
+ * the angle between them. */
+static Status go_unseen(Solver *s, double t, int i, double roundings, double apart, double *y) {
+    const System *x = s->system;
     Mechanism *b = &s->stepped;
-    if (go_beside(s, t, sizes, y) != OK) return FAILED;
+    double *rate = s->part.crossing->rate, *along = s->part.crossing->along;
+    const double span = span_of(s, i);
+    memset(along, 0, (size_t)x->nv * sizeof *along);
+    along[i] = roundings * DBL_EPSILON / apart * (span > 0 ? span : 1);
+    state_gather(x, s->state.q, s->state.v, y);
+    mechanism_kinematics(b, segment_instant(s, t), y);
+    mechanism_rates(b, along, rate);
+    for (int j = 0; j < x->nq; j++) y[j] += rate[j];
+    return segment_project(s, t, y);
+}
+
+/* Adds part times the multipliers (m), the same times the angle (m), and accelerations (nv), of the motion at y. */
+static Status add_motion(Solver *s, double t, const double *y, double part, double *sum) {
+    const int m = s->system->m;
+    Mechanism *b = &s->stepped;
     const double apart = rows_apart(s, t, y);
     if (mechanism_motion(b, segment_instant(s, t), y, y + s->system->nq, s->active) != OK) return FAILED;
     for (int k = 0; k < m; k++) sum[k] += part * b->lambda[k];
@@ -127,21 +143,47 @@ static int all_unique(const Linear *l, int m) {
     return 1;
 }
 
-/* Are accelerations or multipliers others than what a polynomial through the motion beside says?  Multipliers are smooth
- * along a branch, or, where something pushes out of it which they hold by 1 / angle of it, they are so times the angle. */
-static int lost(Solver *s, double t, double sizes, double apart) {
+/* Are accelerations or multipliers of the start others than the sum, once forces at work are those of it?  Multipliers are
+ * smooth along a branch, or, where something pushes out of it which they hold by 1 / angle of it, they are so times it. */
+static int others(Solver *s, double t, double apart) {
     const System *x = s->system;
     Mechanism *b = &s->stepped;
     double *sum = s->part.crossing->sum, *vdot = sum + 2 * x->m, *forces = vdot + x->nv, *reach = forces + x->nv;
-    memset(sum, 0, (size_t)(2 * x->m + x->nv) * sizeof *sum);
-    for (int i = BESIDES - 1; i >= 0; i--) /* the nearest last: forces are those there */
-        if (add_motion(s, t, (i + 1) * sizes, POLYNOMIAL[i], sum) != OK) return 1;
+    double *y = s->part.crossing->y;
     mechanism_at_work(b, forces, reach);
-    if (add_motion(s, t, 0, -1, sum) != OK) return 1;
+    state_gather(x, s->state.q, s->state.v, y);
+    if (add_motion(s, t, y, -1, sum) != OK) return 1;
     for (int i = 0; i < x->nv; i++)
         if (fabs(vdot[i]) > FORCES_LOST * mechanism_largest_alike(x, x->speed_dimension[i], reach)) return 1;
     if (!s->state.now.dependent && !all_unique(&b->linear, x->m)) return 0; /* in it; unique.* says so */
     return differ(b, sum, FORCES_LOST, forces) && differ(b, sum + x->m, FORCES_LOST * apart, forces);
+}
+
+static double *no_motion(Solver *s) {
+    double *sum = s->part.crossing->sum;
+    memset(sum, 0, (size_t)(2 * s->system->m + s->system->nv) * sizeof *sum);
+    return sum;
+}
+
+/* Is the start another than what a polynomial through the motion beside says? */
+static int turns(Solver *s, double t, double sizes, double apart) {
+    double *sum = no_motion(s), *y = s->part.crossing->y;
+    for (int i = BESIDES - 1; i >= 0; i--) /* the nearest last: forces are those there */
+        if (go_beside(s, t, (i + 1) * sizes, y) != OK || add_motion(s, t, y, POLYNOMIAL[i], sum) != OK) return 1;
+    return others(s, t, apart);
+}
+
+/* Is it another than where the rows cannot tell it from the start? */
+static int doubtful(Solver *s, double t, double apart) {
+    double *y = s->part.crossing->y;
+    for (int i = 0; i < s->system->nv; i++) {
+        for (int sign = -1; sign <= 1; sign += 2) {
+            double *sum = no_motion(s);
+            if (go_unseen(s, t, i, sign * ROUNDED, apart, y) != OK || add_motion(s, t, y, 1, sum) != OK) return 1;
+            if (others(s, t, apart)) return 1;
+        }
+    }
+    return 0;
 }
 
 /* Speeds that were completed are known there to eps / apart, and multipliers, which are what is left of their squares, to
@@ -156,7 +198,7 @@ static Status begins(Solver *s) {
     ahead = go_beside(s, t, START_BESIDE, y) == OK ? rows_apart(s, t, y) : -1;
     behind = go_beside(s, t, -START_BESIDE, y) == OK ? rows_apart(s, t, y) : -1;
     if (ahead >= 0 && behind >= 0 && !(fmax(ahead, behind) > OPENS * apart)) return OK; /* they stay as they are */
-    if (!lost(s, t, behind > ahead ? -START_BESIDE : START_BESIDE, apart)) return OK;
+    if (!turns(s, t, behind > ahead ? -START_BESIDE : START_BESIDE, apart) || !doubtful(s, t, apart)) return OK;
     s->why = (Why){""};
     state_gather(s->system, s->state.q, s->state.v, y);
     if (crossing_factor(s, t, y, CROSSING_NAMING) != OK) return FAILED;

@@ -16,7 +16,7 @@
 #define TAKE_FLAGS(member, many, of, name) o->member = arena_ints(arena, many);
 
 void observed_layout(Observed *o, Arena *arena, const System *own) {
-    const System *full = own->embed != NULL ? own->full : own;
+    const System *full = system_read(own);
     const int stepped = own->embed != NULL ? own->nq : 0;
     OBSERVED_NUMBERS(TAKE_NUMBERS)
     OBSERVED_FLAGS(TAKE_FLAGS)
@@ -193,7 +193,7 @@ static Status check_observed_finite(Solver *s, const System *full, const Observe
 }
 
 Status solver_observe(Solver *s, Observed *o) {
-    const System *full = s->system->embed != NULL ? s->system->full : s->system;
+    const System *full = system_read(s->system);
     Mechanism *b = s->system->embed != NULL ? &s->full : &s->stepped;
     const Instant at = segment_instant(s, s->state.now.t);
     system_active(s->system, s->state.closed, s->active);
