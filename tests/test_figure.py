@@ -1,4 +1,4 @@
-"""Figures of a run (lagfmu simulate --plot), and the README's, which is one of them."""
+"""Figures of a run (lagfmu simulate --plot), and that of the first page, which is one of them."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from lagfmu import Result
 from lagfmu.testing import COLOURS, app, figure_of
 
 REPOSITORY = Path(__file__).parent.parent
-README = (REPOSITORY / "README.md").read_text(encoding="utf-8")
+PAGE = (REPOSITORY / "docs" / "index.md").read_text(encoding="utf-8")
 SVG = "{http://www.w3.org/2000/svg}"
 
 
@@ -56,10 +56,10 @@ def read(path: Path) -> tuple[list[str], list[Any]]:
     return sorted(c.text.strip() for c in root.iter(etree.Comment)), curves
 
 
-def test_the_figure_of_the_readme_is_drawn_by_its_command(tmp_path: Path) -> None:
-    """What the command below it draws today: the same texts, both curves to a hundredth of their range; and
+def test_the_figure_of_the_first_page_is_drawn_by_its_command(tmp_path: Path) -> None:
+    """What the command beside it draws today: the same texts, both curves to a hundredth of their range; and
     lambda = m g (3 cos theta - 2 cos theta0) until it is 0."""
-    told = re.search(r"`lagfmu (simulate [^`]* --plot (\S+) [^`]*)`", README)
+    told = re.search(r"`lagfmu (simulate [^`]* --plot (\S+) [^`]*)`", PAGE)
     assert told is not None
     out = tmp_path / "anew.svg"
     words = [str(REPOSITORY / w) if w.startswith("models/") else w for w in shlex.split(told[1])]

@@ -86,7 +86,7 @@ def test_every_command_has_the_options_that_the_readme_gives_it(command):
 )
 def test_the_commands_run_as_printed(tmp_path, monkeypatch, pages):
     """In a folder with bead.py, crank.py and the repository's models, one after the other."""
-    for name, block in zip(("bead.py", "crank.py"), [BLOCKS[0], BLOCKS[2]], strict=True):
+    for name, block in zip(("bead.py", "crank.py"), [BLOCKS[0], BLOCKS[1]], strict=True):
         (tmp_path / name).write_text(block, encoding="utf-8")
     for folder in ("models", "tests"):
         (tmp_path / folder).symlink_to(REPOSITORY / folder)
