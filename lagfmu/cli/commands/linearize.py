@@ -40,6 +40,9 @@ def linearize(
         list[Path] | None,
         typer.Option(help="Write A, B, C, D and all else: .json or .mat; repeatable."),
     ] = None,
+    page: Annotated[
+        Path | None, typer.Option(help="Write an HTML file on which the modes move.")
+    ] = None,
 ) -> None:
     """A, B, C, D, poles and modes in coordinates that the constraints leave free."""
     from ...fmu.read import read_description, units_of
@@ -59,6 +62,7 @@ def linearize(
             inputs=names(inputs),
             outputs=names(outputs),
             start_values=assignments(set_, lambda: units_of(read_description(fmu).modelVariables)),
+            page=page,
         )
         say(found.summary())
         for table in found.tables():
@@ -67,3 +71,5 @@ def linearize(
             say(text, "note:", "yellow")
         for path in output or ():
             say_wrote(found.save(path))
+        if page is not None:
+            say_wrote(page)

@@ -170,10 +170,7 @@ def _turning(ex: Exchange, places: Sequence[str], inputs: Sequence[str]) -> tupl
     h = FLOW / quick
 
     def at(steps: float) -> Floats:
-        ex.put(x + steps * h * rate)
-        for name, value, d in zip(inputs, u, speed, strict=True):
-            if d != 0:
-                ex.drive(name, float(value + steps * h * d))
+        ex.go(x, rate, inputs, u, speed, steps * h)
         by_x = ex.along(places, inputs, np.eye(n))
         return np.hstack([by_x, ex.along(places, inputs, np.zeros((n, m)), np.eye(m))])
 

@@ -88,9 +88,14 @@ def _far(ex: Exchange, now: Chart, dz: Floats) -> float:
 
 def _along(ex: Exchange, now: Chart, one: Floats, other: Floats) -> float:
     """Positive where two displacements go the same way, each coordinate in its size."""
-    place = {n: k for k, n in enumerate(ex.states)}
-    size = np.array([ex.size[place[n]] for n in now.names[: now.places]])
+    size = _sizes(ex, now)
     return float((one / size) @ (other / size))
+
+
+def _sizes(ex: Exchange, now: Chart) -> Floats:
+    """Of the coordinates of z."""
+    size = dict(zip(ex.states, ex.size.tolist(), strict=True))
+    return np.array([size[n] for n in now.names[: now.places]])
 
 
 def _inertia(ex: Exchange, now: Chart) -> Floats:
@@ -105,8 +110,7 @@ def _step(ex: Exchange, now: Chart, M: Floats, a: Floats) -> tuple[Floats, float
     """dz of the coordinates, and the part of the forces M a that it does not take away."""
     if not len(a):
         return np.zeros(now.places), 0.0
-    place = {n: k for k, n in enumerate(ex.states)}
-    size = np.array([ex.size[place[n]] for n in now.names[: now.places]])
+    size = _sizes(ex, now)
     K, a = M @ (now.E @ now.A)[now.places :, : now.places] * size, M @ a
     weight = np.abs(K).max(axis=1, initial=0.0)
     weight = 1 / np.where(weight > 0, weight, max(float(weight.max(initial=0.0)), 1.0))
@@ -144,6 +148,11 @@ def _trusted(
 def _move(ex: Exchange, rows: Rows, inputs: Sequence[str], now: Chart, dz: Floats) -> None:
     """By dz, and back onto f = 0."""
     x = ex.state() + np.where(ex.coordinate, now.T[:, : now.places] @ dz, 0.0)
+    place(ex, rows, inputs, now, x)
+
+
+def place(ex: Exchange, rows: Rows, inputs: Sequence[str], now: Chart, x: Floats) -> None:
+    """At x, and onto f = 0 by Gauss and Newton, which begins with the J of a chart nearby."""
     ex.put(x)
     if not rows.places:
         return

@@ -143,10 +143,12 @@ class Exchange:
             whole[self.kept] = x
             self.fmu.setContinuousStates((ctypes.c_double * len(whole))(*whole), len(whole))
 
-    def drive(self, name: str, value: float) -> None:
-        """Set an input."""
+    def go(self, x: Floats, dx: Floats, by: Sequence[str], u: Floats, du: Floats, h: float) -> None:
+        """Set the states x + h dx, and of the inputs `by` those that du moves to u + h du."""
+        self.put(x + h * dx)
+        moved = [(n, float(a + h * d)) for n, a, d in zip(by, u, du, strict=True) if d != 0]
         with self._refusing():
-            self._set({name: value})
+            self._set(dict(moved))
 
     def at(self, t: float) -> None:
         """Set the time [s]."""
@@ -206,10 +208,7 @@ class Exchange:
         h = PART / reach
 
         def side(steps: float) -> Floats:
-            self.put(x + steps * h * dx)
-            for n, value, d in zip(by, u, du, strict=True):
-                if d != 0:
-                    self.drive(n, float(value + steps * h * d))
+            self.go(x, dx, by, u, du, steps * h)
             return self.read(of)
 
         near, wide, far = (side(s) - side(-s) for s in (1, 2, 4))

@@ -14,6 +14,7 @@ import numpy as np
 
 from ... import names
 from ...errors import SettingError, SimulationError, UsageError
+from ...files import write_whole
 from ...fmu.read import described_rules, kind_of, read_description
 from ...fmu.session import Session
 from ...fmu.target import NATIVE, missing_for_native
@@ -24,10 +25,13 @@ from ...model.model import Model
 from ...model.scene import EVERYTHING, Scene
 from ...model.selection import select
 from ...prepare.prepare import prepare
+from ..live.playable import told_by
+from ..live.render import render
 from .chart import Chart, Rows, acting, chart
 from .checks import check_contacts, check_sliding
 from .equilibrium import find
 from .exchange import Exchange
+from .modes import modes
 from .poles import ZERO, poles
 from .result import Linearization
 
@@ -45,12 +49,14 @@ def linearize(
     outputs: Sequence[str] | None = None,
     start_values: Mapping[str, Any] | None = None,
     scene: Scene | str | None = None,
+    page: str | os.PathLike[str] | None = None,
 ) -> Linearization:
     """A, B, C, D of a model, a model file or an FMU, in coordinates that its constraints leave free.
 
     Beside its start; `at`: beside the state of its motion at that time [s]; `equilibrium`: beside the
     equilibrium that Newton's method finds from the start.  `inputs` and `outputs`: names and patterns (all
-    Real ones; of outputs multipliers, forces of constraint and those of the model's own).  Raises
+    Real ones; of outputs multipliers, forces of constraint and those of the model's own).  `page`: an HTML
+    file to be written, on which the modes move.  Raises
     SettingError for names, SimulationError where there is no equilibrium, where a friction slides, a contact
     grazes, or has departed before `at`.
     """
@@ -78,7 +84,7 @@ def linearize(
             else:
                 check_contacts(ex)
                 beside = chart(ex, rows, driven)
-            return _made(
+            found = _made(
                 ex,
                 description,
                 rows,
@@ -89,6 +95,10 @@ def linearize(
                 equilibrium,
                 outputs is not None,
             )
+            if page is not None:
+                shown = modes(ex, rows, driven, beside, found, told_by(path))
+                write_whole(Path(page), render(shown).encode())
+            return found
 
 
 @contextlib.contextmanager

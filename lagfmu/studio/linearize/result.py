@@ -24,6 +24,7 @@ SHOWN, MOVES = (
     4,
     0.05,
 )  # coordinates of a mode in words; part of the largest that one moves at least
+HEAD = ("pole [1/s]", "frequency [Hz]", "damping", "time [s]", "moves")
 CHANGES = 1e-3  # of A along the motion
 
 
@@ -118,22 +119,24 @@ class Linearization:
             point.add_row(
                 escape(name), f"{_clean(value):.9g}", for_reading(self.units.get(name, "1"))
             )
-        head = ("pole [1/s]", "frequency [Hz]", "damping", "time [s]", "moves")
-        drawn = new_table("modes", *head, text=["moves"])
+        drawn = new_table("modes", *HEAD, text=HEAD[-1:])
         for k, s in enumerate(self.poles.values):
-            if s.imag < 0:
-                continue
-            waves = abs(s.imag) > 0
-            real = s.real if abs(s.real) > LEAST * abs(s) else 0.0
-            pole = f"{real:.9g}" + (f" +- {s.imag:.9g}i" if waves else "")
-            drawn.add_row(
-                pole,
-                f"{abs(s) / (2 * np.pi):.6g}" if waves else "",
-                f"{-real / abs(s) + 0.0:.4f}",
-                f"{1 / abs(real):.5g}" if real else "",
-                escape(self.words(k)),
-            )
+            if s.imag >= 0:
+                drawn.add_row(*map(escape, self.row(k)))
         return [point, drawn]
+
+    def row(self, k: int) -> tuple[str, str, str, str, str]:
+        """Of the table of modes."""
+        s = self.poles.values[k]
+        waves = abs(s.imag) > 0
+        real = s.real if abs(s.real) > LEAST * abs(s) else 0.0
+        return (
+            f"{real:.9g}" + (f" +- {s.imag:.9g}i" if waves else ""),
+            f"{abs(s) / (2 * np.pi):.6g}" if waves else "",
+            f"{-real / abs(s) + 0.0:.4f}",
+            f"{1 / abs(real):.5g}" if real else "",
+            self.words(k),
+        )
 
     def remarks(self) -> list[str]:
         """What is indifferent, and what to know."""

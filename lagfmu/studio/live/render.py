@@ -40,6 +40,7 @@ APPLICATION = (
     "main.js",
 )
 IN_SPACE = ("meshes.js", "space.js", "orbit.js")  # before the last, if the picture is in space
+OF_MODES = ("modes.js",)  # likewise, if there are modes
 WORKER = ("fmu.js", "worker.js")
 COMMENT = re.compile(r"^[ \t]*/\*.*?\*/[ \t]*\n", re.MULTILINE | re.DOTALL)
 REMARK = re.compile(r"[ \t]+// [^\"'`\n]*$", re.MULTILINE)  # behind code, not within a string
@@ -51,12 +52,13 @@ SPACE, SPACE_LICENCE = "three.min.js", "three.LICENSE"
 @dataclass(frozen=True)
 class Playable:
     """What a page is made of: facts (facts.py), equations to read, and the compiled module; or in its
-    place a run that was recorded (recording.py)."""
+    place runs that were recorded (recording.py), of `modes` one for each, with what there is to read."""
 
     facts: dict[str, Any]
     equations: Sequence[Section]
     module: bytes = b""
     recording: bytes = b""
+    modes: dict[str, Any] | None = None
 
     @property
     def name(self) -> str:
@@ -69,7 +71,8 @@ def render(playable: Playable) -> str:
     picture = playable.facts["picture"]
     in_space = picture is not None and picture["dimensions"] == 3
     *parts, main = APPLICATION
-    application = _script(_joined((*parts, *(IN_SPACE if in_space else ()), main)))
+    parts += [*(IN_SPACE if in_space else ()), *(OF_MODES if playable.modes else ())]
+    application = _script(_joined((*parts, main)))
     library = _script(f"/*\n{_text('vendor', LICENCE)}*/\n{_text('vendor', LIBRARY)}")
     style = _text("vendor", LIBRARY_STYLE) + _lean(_text("page.css"))
     scripts = [library, application]
@@ -82,6 +85,7 @@ def render(playable: Playable) -> str:
         description=playable.facts["description"],
         equations=playable.equations,
         picture=picture is not None,
+        modes=playable.modes,
         space=_packed(_text("vendor", SPACE).encode()) if in_space else "",
         facts=as_json(lean(playable.facts)),
         module=_packed(playable.module),

@@ -73,19 +73,24 @@ class Recording {
     this.loaded = this.load(box);
   }
 
-  /* One number after the other: the times, then column by column. */
+  /* One number after the other: the times, then column by column; of several runs one after the other. */
   async load(box) {
     const numbers = new Float64Array(await inflated(box));
-    const rows = numbers.length / (COLUMNS.length + 1);
+    const count = FACTS.modes ? FACTS.modes.length : 1;
+    const rows = numbers.length / (COLUMNS.length + 1) / count;
     const part = (k) => numbers.slice(k * rows, (k + 1) * rows);
-    const columns = COLUMNS.map((v, k) => part(k + 1));
-    this.recorded = { time: part(0), columns, log: [], failed: null, milliseconds: null };
+    this.recorded = Array.from({ length: count }, (_, i) => {
+      const [time, ...columns] = Array.from({ length: COLUMNS.length + 1 }, (_, k) =>
+        part(i * (COLUMNS.length + 1) + k)
+      );
+      return { time, columns, log: [], failed: null, milliseconds: null };
+    });
     return { methods: [] };
   }
 
   async run() {
     await this.loaded;
-    return this.recorded;
+    return this.recorded[this.chosen || 0];
   }
 
   async compare() {

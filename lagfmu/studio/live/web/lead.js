@@ -24,6 +24,13 @@ class Lead {
     this.now(this.t || 0);
   }
 
+  /* From the next run on. */
+  choose(name) {
+    this.menu.value = PLACE.get(name);
+    if (this.chart) this.chart.drop();
+    this.chart = null;
+  }
+
   show(trajectory) {
     this.trajectory = trajectory;
     if (!this.menu.options.length) return;

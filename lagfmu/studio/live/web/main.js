@@ -141,6 +141,7 @@ function tell() {
   const steps = STEPS === undefined ? "" : `, ${trajectory.columns[STEPS].at(-1)} steps`;
   const took = trajectory.milliseconds !== null ? `, ${shown(trajectory.milliseconds, 2)} ms` : "";
   const events = trajectory.events.slice(0, 3).map((e) => `${e.text} ${e.truth ? "by" : "at"} ${shown(e.time)} s`);
+  if (FACTS.modes) return; // their words stand above
   const end = `Run to ${shown(trajectory.end)} s${steps}${took}`;
   byId("status").textContent = [end, ...events].join("; ");
 }
@@ -220,6 +221,7 @@ window.lagfmu.shown = () => ({
   ...byName(trajectory),
 });
 
+if (FACTS.modes) new Modes(player, lead, changed);
 const missing = openLink();
 window.addEventListener("hashchange", () => {
   settings.clear();

@@ -6,6 +6,8 @@ class Player {
     this.t = 0;
     this.end = 1;
     this.playing = false;
+    this.pace = 1; // seconds of the run in one of the reader's
+    this.repeats = false;
     this.scrub = byId("scrub");
     this.button = byId("play-button");
     this.scrub.addEventListener("input", () => this.seek(this.scrub.valueAsNumber));
@@ -50,7 +52,8 @@ class Player {
 
   frame(now) {
     if (!this.playing) return;
-    const t = this.t + (Math.max(0, now - this.last) / 1000) * this.speed;
+    let t = this.t + (Math.max(0, now - this.last) / 1000) * this.speed * this.pace;
+    if (this.repeats && t >= this.end) t %= this.end;
     this.last = now;
     this.seek(t, true);
     if (this.t >= this.end) this.toggle();
