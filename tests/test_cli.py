@@ -342,6 +342,17 @@ def test_the_version_is_that_of_the_package():
     assert lagfmu("--version") == f"lagfmu {importlib.metadata.version('lagfmu')}"
 
 
+def test_a_model_in_coherent_units_is_read_without_pint():
+    """Loading Pint's registry took a quarter of `lagfmu show`."""
+    code = (
+        "import sys\nfrom lagfmu.testing import load\nfrom pathlib import Path\n"
+        f"load(Path({str(MODELS / 'hemisphere.py')!r}))\n"
+        "assert 'pint' not in sys.modules"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert run.returncode == 0, run.stderr
+
+
 @pytest.mark.parametrize("words", [["--version"], ["--help"], ["sweep", "--help"]])
 def test_help_and_version_are_told_without_waiting(words):
     """`python -m lagfmu` imports nothing that calculates for what can be said without it, keeps NumPy to one

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 
+import pint
 import pytest
 import sympy as sp
 from hypothesis import given
@@ -38,6 +39,44 @@ UNITS = {
     **{theta: unit("rad"), m: unit("kg"), g: unit("m/s2"), k: unit("N/m"), F: unit("N"), n: ONE},
 }
 KINETIC = m * (r.diff(t) ** 2 + r**2 * theta.diff(t) ** 2) / 2
+
+
+@pytest.mark.parametrize(
+    "symbol",
+    [
+        "N",
+        "J",
+        "W",
+        "Pa",
+        "V",
+        "Ohm",
+        "F",
+        "C",
+        "S",
+        "Wb",
+        "T",
+        "H",
+        "Hz",
+        "Gy",
+        "Sv",
+        "kat",
+        "kg",
+        "m",
+        "s",
+        "A",
+        "K",
+        "mol",
+        "cd",
+        "rad",
+    ],
+)
+def test_each_symbol_has_the_dimension_that_pint_knows(symbol):
+    """lagfmu reads the symbols of coherent SI by itself: their size is 1, their exponents are Pint's."""
+    registry = pint.UnitRegistry()
+    factor, base = registry.get_base_units("ohm" if symbol == "Ohm" else symbol)
+    powers = registry.parse_units_as_container(str(base))
+    assert unit(symbol).base == {registry.get_symbol(n): p for n, p in powers.items()}
+    assert factor == 1
 
 
 def problems(expr: object, expected: Unit | None = None) -> list[str]:

@@ -1,6 +1,7 @@
 """Units in coherent SI.
 
-Pint reads the unit strings; a `Unit` keeps its exponents over the SI base and a Modelica name.
+A `Unit` keeps its exponents over the SI base and a Modelica name.  Products of the symbols of coherent SI are
+read here, all other units by Pint, which is loaded for the first of them: 0.4 s.
 The radian is carried apart (FMI has it as a base unit) and counts as dimensionless.
 """
 
@@ -11,30 +12,57 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import lru_cache
-from typing import Any
-
-import pint
+from functools import cache, lru_cache
+from typing import TYPE_CHECKING, Any
 
 from ..errors import UnitError
+
+if TYPE_CHECKING:
+    import pint
 
 BASE = ("kg", "m", "s", "A", "K", "mol", "cd")
 SUPERSCRIPT = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 _EXAMPLES = "'m', 'rad', 'N.m', 'm/s2', 'kg.m2' or '1'"
-_REGISTRY: pint.UnitRegistry[Any] = pint.UnitRegistry()
-_REGISTRY.define("@alias ohm = Ohm")
-# The symbols a unit name may be made of, in the order in which a name lists them.
-_SYMBOLS = (
-    *("N", "J", "W", "Pa", "V", "Ohm", "F", "C", "S", "Wb", "T", "H", "Hz", "Gy", "Sv", "kat"),
-    *(*BASE, "rad"),
-)
+# What a unit name may be made of, in the order in which a name lists them, as powers of BASE and rad.
+_DERIVED = {
+    "N": (1, 1, -2),
+    "J": (1, 2, -2),
+    "W": (1, 2, -3),
+    "Pa": (1, -1, -2),
+    "V": (1, 2, -3, -1),
+    "Ohm": (1, 2, -3, -2),
+    "F": (-1, -2, 4, 2),
+    "C": (0, 0, 1, 1),
+    "S": (-1, -2, 3, 2),
+    "Wb": (1, 2, -2, -1),
+    "T": (1, 0, -2, -1),
+    "H": (1, 2, -2, -2),
+    "Hz": (0, 0, -1),
+    "Gy": (0, 2, -2),
+    "Sv": (0, 2, -2),
+    "kat": (0, 0, -1, 0, 0, 1),
+}
+_SI = {s: dict(zip(BASE, powers, strict=False)) for s, powers in _DERIVED.items()}
+_SI |= {s: {s: 1} for s in (*BASE, "rad")}
+_SYMBOLS = tuple(_SI)
+
+
+@cache
+def _registry() -> tuple[pint.UnitRegistry[Any], dict[str, str]]:
+    """Pint, and our symbol for each of its names that has one."""
+    import pint
+
+    registry: pint.UnitRegistry[Any] = pint.UnitRegistry()
+    registry.define("@alias ohm = Ohm")
+    return registry, {registry.get_name(symbol): symbol for symbol in _SYMBOLS}
 
 
 def _base_units(symbol: str) -> tuple[float, dict[str, Fraction]]:
     """The factor of a unit symbol to SI, and its exponents over the SI base and rad."""
-    factor, base = _REGISTRY.get_base_units(symbol)
-    powers = _REGISTRY.parse_units_as_container(str(base))
-    short = {_REGISTRY.get_symbol(name): fraction(power) for name, power in powers.items()}
+    registry, _ = _registry()
+    factor, base = registry.get_base_units(symbol)
+    powers = registry.parse_units_as_container(str(base))
+    short = {registry.get_symbol(name): fraction(power) for name, power in powers.items()}
     return float(str(factor)), {name: p for name, p in short.items() if name in (*BASE, "rad")}
 
 
@@ -43,8 +71,6 @@ def fraction(power: Any) -> Fraction:
     return Fraction(power).limit_denominator(1000)
 
 
-_SI = {symbol: _base_units(symbol)[1] for symbol in _SYMBOLS}
-_NAMES = {_REGISTRY.get_name(symbol): symbol for symbol in _SYMBOLS}  # pint's name -> our symbol
 LONGEST, MOST = 200, 99  # characters of a unit, and its largest exponent
 # one exponent; pint evaluates what it is handed, a power of a power too
 _EXPONENT = re.compile(
@@ -227,8 +253,11 @@ def parse_scaled(text: str, what: str) -> DisplayUnit:
         raise UnitError(
             f"{given}, which is not a unit; {expected}: correct the unit (exponents to {MOST})"
         )
+    if (factors := _coherent(marked)) is not None:
+        return DisplayUnit(" ".join(text.split()), _unit(factors), 1.0, True)
+    registry, names = _registry()
     try:
-        container = _REGISTRY.parse_units_as_container(marked.replace("^", "**"), as_delta=False)
+        container = registry.parse_units_as_container(marked.replace("^", "**"), as_delta=False)
         powers = {name: fraction(power) for name, power in container.items()}
     except Exception as error:  # pint lets the errors of its tokenizer and evaluator through
         raise UnitError(f"{given}, which is not a unit; {expected}: correct the unit") from error
@@ -240,12 +269,12 @@ def parse_scaled(text: str, what: str) -> DisplayUnit:
         raise UnitError(f"{given}; {expected}: use exponents to {MOST}")
     scale, coherent, multiple, offset = 1.0, ONE, False, False
     for name, power in powers.items():
-        if name in _NAMES:
-            coherent *= _unit({_NAMES[name]: power})
+        if name in names:
+            coherent *= _unit({names[name]: power})
             continue
         multiple = True
         size, base = _base_units(name)
-        offset = offset or _REGISTRY.Quantity(0.0, name).to_base_units().magnitude != 0
+        offset = offset or registry.Quantity(0.0, name).to_base_units().magnitude != 0
         scale *= _power(size, int(power))
         coherent *= _named(_unit(base)) ** power
     if offset:
@@ -258,6 +287,23 @@ def parse_scaled(text: str, what: str) -> DisplayUnit:
             f"{given}, whose size is no number of double precision: use {coherent.name!r}"
         )
     return DisplayUnit(" ".join(text.split()), coherent, scale, not multiple)
+
+
+def _coherent(marked: str) -> dict[str, Fraction] | None:
+    """The powers of `_SYMBOLS` in "kg*m^2/s^2" or "J/(kg*K)"; None for what is not made of these alone."""
+    factor = r"(?:[A-Za-z]+(?:\^-?\d{1,2})?|1)"
+    product = rf"{factor}(?:\s*[*\s]\s*{factor})*"
+    if not re.fullmatch(rf"{product}(?:\s*/\s*(?:{factor}|\(\s*{product}\s*\)))*", marked):
+        return None
+    total: dict[str, Fraction] = {}
+    for slash, part in re.findall(r"(/?)\s*([^/]+)", marked):
+        for symbol, power in re.findall(r"([A-Za-z]+)(?:\^(-?\d+))?", part):
+            total[symbol] = total.get(symbol, Fraction(0)) + int(power or 1) * (-1 if slash else 1)
+    return (
+        total
+        if total.keys() <= _SI.keys() and max(map(abs, total.values()), default=0) <= MOST
+        else None
+    )
 
 
 def _is_product(marked: str) -> bool:
