@@ -21,7 +21,7 @@ import lagfmu
 from lagfmu.model.file import load
 from lagfmu.prepare.prepare import prepare
 from lagfmu.studio.film import film
-from lagfmu.studio.live.playable import told_by
+from lagfmu.studio.live.play import told_by
 
 MODELS = Path(__file__).parent.parent / "models"
 MODEL = re.compile(r"\[([^\]]+)\]\((?:\.\./)+models/(\w+)\.py\)")

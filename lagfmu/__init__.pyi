@@ -39,12 +39,12 @@ from .model.picture import (
 from .model.reactions import force_of_constraint, multiplier
 from .model.scene import Scene
 from .model.spline import Spline
-from .studio.fit.experiment import Experiment
+from .studio.fit.problem import Experiment
 from .studio.fit.result import Fit
 from .studio.fit.solve import fit
 from .studio.linearize.linearize import linearize
 from .studio.linearize.result import Linearization
-from .studio.live.command import play
+from .studio.live.play import play
 from .studio.report.report import report
 from .studio.sensitivity.local import sensitivity
 from .studio.sweep.sweep import sweep

@@ -163,10 +163,10 @@ def _shown(
     """
     if find_spec(".studio", __package__) is None:
         return "", "", {}
-    from .studio.live.icon import icon
-    from .studio.live.playable import playable
-    from .studio.live.render import render
-    from .studio.tradeoff.page import section
+    from .studio.live.page import render
+    from .studio.live.play import playable
+    from .studio.live.view import icon
+    from .studio.tradeoff.choose import section
 
     told = section(choice) if choice else ""
     return told, render(playable(prepared)) if page else "", icon(prepared)

@@ -93,25 +93,23 @@ from .prepare.prepare import Prepared, prepare
 from .prepare.starts import StartMovedWarning
 from .studio import film
 from .studio.fit import solve as fit_solve
-from .studio.live import moving, solids, view, wasm
-from .studio.live.icon import icon
-from .studio.live.moving import Moving
-from .studio.live.playable import playable, told_by
-from .studio.live.render import Playable, render
+from .studio.live import play as live_play
+from .studio.live import shapes, view
+from .studio.live.page import Playable, render
+from .studio.live.play import playable, told_by
+from .studio.live.shapes import Moving
+from .studio.live.view import icon
 from .studio.report import pdf as report_pdf
 from .studio.report.findings import obtained
-from .studio.report.study import study_in
+from .studio.report.report import study_in
 from .studio.sensitivity.local import sensitivity
 from .studio.sensitivity.ranges import over_ranges
-from .studio.stress import runs, worker
+from .studio.stress import probes as runs
+from .studio.stress import worker
 from .studio.stress.bench import Bench, Finding
-from .studio.stress.closed_forms import judged, magnitude
-from .studio.stress.facts import facts_of
-from .studio.stress.judge import Check, sizes_of
+from .studio.stress.invariants import Check, judged, magnitude, sizes_of
 from .studio.stress.lagrange import lagrange, lay_beside
-from .studio.stress.player import Run, clear
-from .studio.stress.player import opened as session_of
-from .studio.stress.probe import (
+from .studio.stress.probes import (
     CONSISTENT,
     REFUSED,
     RIGHT,
@@ -120,26 +118,24 @@ from .studio.stress.probe import (
     Probe,
     Verdict,
     attempt,
+    departures,
+    probes,
+    started,
     verdict,
 )
-from .studio.stress.probes import probes
 from .studio.stress.report import NO_WORRY, VERDICTS, WORRY, Stressed
-from .studio.stress.runs import departures, started
+from .studio.stress.specimen import Run, clear, facts_of
+from .studio.stress.specimen import opened as session_of
 from .studio.sweep import engine
 from .studio.sweep.design import axis, design, distribution, sampled
 from .studio.sweep.design import from_file as rows_from
-from .studio.sweep.parts import Parts, PartWarning
 from .studio.sweep.process import SessionProcess
-from .studio.sweep.table import happened, read_rows
-from .studio.tradeoff.choose import choose
-from .studio.tradeoff.held_out import other_values
+from .studio.sweep.results import Parts, PartWarning, happened, read_rows
+from .studio.tradeoff.choose import choose, other_values
 from .studio.tradeoff.measure import Plan as TradeoffPlan
 from .studio.tradeoff.measure import Point, Tradeoff, measure
-from .studio.tradeoff.observe import observe, opened
-from .studio.tradeoff.quantities import OWN, quantities
-from .studio.tradeoff.reference import refer
-from .studio.tradeoff.report import table as tradeoff_table
-from .studio.tradeoff.setting import Setting
+from .studio.tradeoff.measure import table as tradeoff_table
+from .studio.tradeoff.reference import OWN, Setting, observe, opened, quantities, refer
 from .verification import junit
 from .verification.closed_forms import applies, check_closed_form, landed
 from .verification.evaluate import Compiled

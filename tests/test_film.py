@@ -14,7 +14,7 @@ from PIL import Image
 from typer.testing import CliRunner
 
 from lagfmu import simulate
-from lagfmu.testing import Prepared, app, film, moving, solids, told_by, view
+from lagfmu.testing import Prepared, app, film, shapes, told_by, view
 
 Fmu = Callable[[str], Path]
 
@@ -92,19 +92,19 @@ def test_facets_enclose_their_solid() -> None:
     center = np.array([[0.0, 0, 0], [1, -2, 3]])
     turned = [np.array([[0.36, 0.48, -0.8]] * 2), np.array([[-0.8, 0.6, 0]] * 2)]
     turned.append(np.cross(*turned))
-    box = solids.box(center, np.array([[2.0, 3, 5]] * 2), turned)
+    box = shapes.box(center, np.array([[2.0, 3, 5]] * 2), turned)
     assert [volume(box, k) for k in (0, 1)] == pytest.approx([30, 30])
-    n = solids.ROUND
+    n = shapes.ROUND
     way = np.array([0.3, 0.4, 1.2])
-    rod = solids.cylinder(center, center + way, np.array([0.5, 0.1]))
+    rod = shapes.cylinder(center, center + way, np.array([0.5, 0.1]))
     polygon = n / 2 * np.sin(2 * np.pi / n)
     expected = [1.3 * polygon * 0.25, 1.3 * polygon * 0.01]
     assert [volume(rod, k) for k in (0, 1)] == pytest.approx(expected)
-    assert volume(solids.ball(center, np.array([2.0, 1.0])), 0) == pytest.approx(
+    assert volume(shapes.ball(center, np.array([2.0, 1.0])), 0) == pytest.approx(
         32 * np.pi / 3, rel=0.05
     )
-    upright = solids.box(center, np.ones((2, 3)), [np.array([e] * 2, float) for e in np.eye(3)])
-    shades = [solids.shade(f[0], moving.TOWARDS) for f in upright]
+    upright = shapes.box(center, np.ones((2, 3)), [np.array([e] * 2, float) for e in np.eye(3)])
+    shades = [shapes.shade(f[0], shapes.TOWARDS) for f in upright]
     seen = [light for light in shades if light is not None]
     assert len(seen) == 3
     assert max(seen) == shades[4]  # facing z

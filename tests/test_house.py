@@ -235,13 +235,12 @@ def test_one_door_writes_files() -> None:
     )
     found = {p.relative_to(ROOT).as_posix() for p in MODULES if writes.search(p.read_text("utf-8"))}
     beside = {  # what they hand to write_whole, or to a figure's picture in memory
-        *("files.py", "verification/figure.py", "studio/film.py", "studio/live/icon.py"),
-        *("studio/report/figures.py", "studio/sweep/parts.py", "studio/sweep/sweep.py"),
-        "studio/sweep/table.py",
+        *("files.py", "verification/figure.py", "studio/film.py", "studio/live/view.py"),
+        *("studio/report/report.py", "studio/sweep/results.py", "studio/sweep/sweep.py"),
     }
     temporary = {
         *("fmu/compiler.py", "fmu/trial.py", "verification/simulate.py"),
-        *("studio/report/firefox.py", "studio/report/pdf.py"),
+        "studio/report/pdf.py",
     }
     assert found <= beside | temporary, found - beside - temporary
 

@@ -13,7 +13,7 @@ import pytest
 from conftest import MODELS, Opened
 from typer.testing import CliRunner
 
-from lagfmu.testing import Playable, app, render, wasm
+from lagfmu.testing import Playable, app, live_play, render
 from lagfmu.testing import playable as playable_of
 
 
@@ -107,7 +107,7 @@ def test_without_zig_the_message_says_what_to_do(
     native_fmu: Callable[[str], Path], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     """The system's cc knows no WebAssembly."""
-    monkeypatch.setattr(wasm, "find_compiler", lambda: None)
+    monkeypatch.setattr(live_play, "find_compiler", lambda: None)
     fmu = str(native_fmu("Hemisphere"))
     result = CliRunner().invoke(app, ["page", fmu, "--out", str(tmp_path / "p.html")])
     assert result.exit_code == 3

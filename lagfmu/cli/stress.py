@@ -22,11 +22,10 @@ from ..model.file import ModelFile
 from ..model.scene import Scene
 from ..prepare.prepare import prepare
 from ..studio.host import DiedError, Host, LateError
-from ..studio.stress.facts import facts_of
 from ..studio.stress.lagrange import lay_beside
-from ..studio.stress.probe import UNFINISHED, WRONG, Probe, Verdict
-from ..studio.stress.probes import probes
+from ..studio.stress.probes import UNFINISHED, WRONG, Probe, Verdict, probes
 from ..studio.stress.report import MEANING, Stressed, report, summary, table
+from ..studio.stress.specimen import facts_of
 from ..verification.junit import Report
 from .progress import progress
 from .works import studied

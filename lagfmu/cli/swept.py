@@ -13,7 +13,7 @@ from rich.markup import escape
 
 from ..model.units import for_reading
 from ..page.table import new_table, print_whole
-from ..studio.sweep.table import INFINITE, happened, numbers, one_by_one, varied
+from ..studio.sweep.results import INFINITE, happened, numbers, one_by_one, varied
 from .terminal import console, say
 
 SHOWN = 5  # reasons in the summary

@@ -20,9 +20,7 @@ from ..numeric.tolerance import tolerance_problem
 from ..page.table import print_whole
 from ..prepare.prepare import prepare
 from ..studio.tradeoff.choose import Choice
-from ..studio.tradeoff.figure import draw
-from ..studio.tradeoff.measure import DECADES, Plan, Tradeoff, measure
-from ..studio.tradeoff.report import remarks, report, table
+from ..studio.tradeoff.measure import DECADES, Plan, Tradeoff, draw, measure, remarks, report, table
 from ..verification.junit import Report
 from .progress import progress
 from .terminal import say, say_wrote

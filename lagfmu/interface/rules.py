@@ -1,7 +1,7 @@
 """What the variables of a table may be set to, by one kind of rule (model/rule.py).
 
 Python callers ask `problems_of`.  The page gets MESSAGES as data, and the columns of each variable
-(studio/live/facts.py).  The FMU itself checks what it is given by the same columns of the variable table:
+(studio/live/page.py).  The FMU itself checks what it is given by the same columns of the variable table:
 runtime/fmi/experiment.c, and by the same kind of rule fmu/slave/instance.py, the python target.
 """
 

@@ -16,11 +16,9 @@ import numpy as np
 from ..errors import BuildError, UsageError
 from ..files import write_whole
 from ..fmu.read import Trajectory
-from .live.playable import Told
-from .live.recording import recorded
-from .live.render import render
-from .live.stage import Stage
-from .live.view import FORCE, INK, View
+from .live.page import render
+from .live.play import Told, recorded
+from .live.view import FORCE, INK, Stage, View
 
 RATE, MOST = 25, 300  # frames per second, and of a film
 ENDINGS = (".gif", ".mp4", ".html", ".webp")

@@ -31,7 +31,7 @@ def page(
 ) -> None:
     """Write one HTML file in which the FMU runs: offline, with sliders, curves and the mechanism."""
     from ...model.file import is_model
-    from ...studio.live.command import write_page
+    from ...studio.live.play import write_page
     from ..scenes import for_models, loaded, narrowed
 
     with plainly():

@@ -86,7 +86,7 @@ def simulate(
             say_wrote(result.plot(*(variable or ()), out=plot_))
         if animate is not None:
             from ...studio.film import film
-            from ...studio.live.playable import told_by
+            from ...studio.live.play import told_by
 
             with console.status(f"drawing {name}"):
                 film(told_by(run), result, given, animate, name)

@@ -1,21 +1,142 @@
-"""What a fit found, as numbers, in words and for machines."""
+"""What a fit found, as numbers, in words and for machines.
+
+With the residuals' Jacobian J, in standard deviations, the covariance of the values is (J^T J)^-1 (Bard,
+Nonlinear Parameter Estimation, 1974, sec. 7-5).  Its singular values say which combinations are determined.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import cycle
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from rich.markup import escape
 from rich.table import Table
+from scipy import stats
 
 from ...model.units import for_reading
 from ...page.table import as_text, new_table
-from .certainty import LEVEL, Certainty, Combination
 from .problem import Problem
 
 Floats = NDArray[np.float64]
+Tables = Mapping[str, Mapping[str, tuple[Floats, Floats, Floats]]]
+
+
+def _draw(
+    tables: Tables,
+    deviations: Mapping[str, float],
+    units: Mapping[str, str],
+    title: str,
+    out: Any = None,
+) -> Any:
+    """A column of two panels for each measured output, a colour for each experiment, whose `tables` hold
+    times [s], measured and fitted values; a Figure, or with `out` the file that it was written to.  Raises
+    BuildError if it cannot be."""
+    import matplotlib as mpl
+
+    from ...verification.figure import STYLE, Drawn, plain, save
+    from ...verification.plot import COLOURS
+
+    outputs = list(deviations)
+    with mpl.rc_context(STYLE | {"font.size": 10}):
+        size = (1.0 + 5.5 * len(outputs), 5.0)
+        figure = Drawn(figsize=size, layout="constrained")
+        axes = figure.subplots(2, len(outputs), sharex="col", squeeze=False, height_ratios=(2, 1))
+        for k, output in enumerate(outputs):
+            above, below = axes[0, k], axes[1, k]
+            unit = for_reading(units.get(output))
+            above.set_title(
+                plain(f"{output} [{unit}]" if unit else output), loc="left", fontsize=10
+            )
+            for colour, (name, columns) in zip(cycle(COLOURS), tables.items(), strict=False):
+                if output not in columns:
+                    continue
+                time, measured, fitted = columns[output]
+                order = np.argsort(time)
+                label = plain(name) if len(tables) > 1 else "measured"
+                above.plot(time, measured, "o", ms=3, color=colour, alpha=0.6, label=label)
+                told = None if len(tables) > 1 else "fitted"
+                above.plot(time[order], fitted[order], color=colour, lw=1.4, label=told)
+                off = (measured - fitted) / deviations[output]
+                below.plot(time, off, "o", ms=3, color=colour, alpha=0.6)
+            below.axhline(0, color="#5b6570", lw=1)
+            below.set_ylabel("residual, in\nstandard deviations" if k == 0 else "")
+            below.set_xlabel("time [s]")
+            above.legend(frameon=False, fontsize=9)
+        figure.suptitle(plain(title), fontsize=11)
+        return figure if out is None else save(figure, Path(out))
+
+
+LOOSE = 1.0  # relative uncertainty from which on a combination is not determined
+SMALL = 0.05  # part in a combination that is not told
+LEVEL = 0.95
+
+
+@dataclass(frozen=True)
+class Combination:
+    """Relative changes of values that hardly change the residuals: all together by one part in 100 change
+    them by `felt` standard deviations."""
+
+    changes: dict[str, float]
+    felt: float
+
+
+@dataclass(frozen=True)
+class Certainty:
+    """Standard `errors` (free,), infinite where the data say nothing and NaN at a bound; `half` (free,): the
+    half widths of the intervals of 95 %; `correlation` (free, free); `loose` combinations; `bounds`: -1 or 1
+    of a value at its lower or upper one."""
+
+    errors: Floats
+    half: Floats
+    correlation: Floats
+    loose: tuple[Combination, ...]
+    bounds: tuple[int, ...]
+
+
+def certainty(
+    problem: Problem,
+    x: Floats,
+    jacobian: Floats,
+    active: Sequence[int],
+    dof: int | None,
+    noise: float,
+) -> Certainty:
+    """`jacobian` (points, free) in standard deviations, and the part of its largest singular value that is
+    `noise`; `active`: see Certainty.bounds; `dof`: degrees of freedom from which the deviations are
+    estimated, None where they are known."""
+    inside = np.asarray(active) == 0
+    scale = np.array([f.scale(v) for f, v in zip(problem.free, x, strict=True)])[inside]
+    names = [f.name for f, free in zip(problem.free, inside, strict=True) if free]
+    _, size, directions = np.linalg.svd(jacobian[:, inside] * scale, full_matrices=False)
+    told = size > noise * (size[0] if len(size) else 0.0)
+    loose = []
+    for s, v in zip(size, directions, strict=True):
+        if s * LOOSE < 1:
+            v = v / v[np.argmax(np.abs(v))]
+            changes = {n: float(c) for n, c in zip(names, v, strict=True) if abs(c) > SMALL}
+            loose.append(Combination(changes, float(s) / 100 * float(np.linalg.norm(v))))
+    part = directions[told] / size[told][:, None]
+    covariance = part.T @ part
+    blind = (np.abs(directions[~told]) > SMALL).any(axis=0)
+    errors = np.sqrt(np.diag(covariance))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        inner = covariance / np.outer(errors, errors)
+    errors = np.where(blind, np.inf, errors * scale)
+    count = len(inside)
+    all_errors, correlation = np.full(count, np.nan), np.full((count, count), np.nan)
+    all_errors[inside] = errors
+    correlation[np.ix_(inside, inside)] = inner
+    quantile = stats.norm.ppf((1 + LEVEL) / 2) if dof is None else stats.t.ppf((1 + LEVEL) / 2, dof)
+    return Certainty(
+        all_errors, all_errors * quantile, correlation, tuple(loose), tuple(int(a) for a in active)
+    )
+
+
 TIED = 0.95  # a correlation that is told
 # parts of the chi-squared distribution between which residuals are as expected
 EXPLAINED = (0.01, 0.99)
@@ -216,10 +337,9 @@ class Fit:
 
     def plot(self, out: Any = None) -> Any:
         """Measured and fitted values with residuals below, as a matplotlib Figure or, with `out`, a file."""
-        from .plot import draw
 
         units = self.problem.units
-        return draw(self.residuals(), self.deviations, units, self.name, out)
+        return _draw(self.residuals(), self.deviations, units, self.name, out)
 
     def __repr__(self) -> str:
         return "\n".join([self.summary(), as_text(self.table()), *self.remarks()])

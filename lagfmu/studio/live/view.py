@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import io
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from .moving import TOWARDS, Array, Moving
-from .solids import shade
+from ...fmu.terminals import ICON
+from ...numeric.instant import at_start, expanded
+from ...page.picture import names_in, picture_of
+from ...prepare.consistency import posed
+from ...prepare.prepare import Prepared
+from .shapes import BETWEEN, TOWARDS, Array, Moving, in_order, shade
 
 PAGE = Path(__file__).parent / "web" / "page.css"  # has the colours, of light paper first
 INK, FORCE, FILL, BOB = (
@@ -247,3 +253,108 @@ def _hatch(a: Array, b: Array, size: float) -> tuple[list[float], list[float]]:
         xs += [start[0], start[0] + away[0], np.nan]
         ys += [start[1], start[1] + away[1], np.nan]
     return xs, ys
+
+
+WIDE, HIGH = 4.2, 3.2  # in, of a sketch at most
+
+
+class Stage:
+    """The shapes of a picture at `times` (frames,) [s] of a run, a structured array; `known`: values of what
+    the run does not tell, by name."""
+
+    def __init__(
+        self,
+        picture: Mapping[str, Any],
+        run: Any,
+        known: Mapping[str, Any],
+        times: Array,
+        labels: bool,
+    ) -> None:
+        self.run, self.known, self.times = run, known, times
+        told = [s for s in picture["shapes"] if s["kind"] != "direction"]
+        self.shapes = [Moving(s, self.look, len(times)) for s in told]
+        all_points = np.arange(BETWEEN * (len(times) - 1) + 1) / BETWEEN
+        fine = np.interp(all_points, np.arange(len(times)), times)
+        for shape in self.shapes:
+            shape.leave_behind(partial(self.look, times=fine))
+        self.in_space = picture["dimensions"] == 3
+        self.view = View(self.shapes, labels=labels)
+
+    def look(self, name: str, times: Array | None = None) -> Any:
+        """A variable at all frames, or at these times, or its one value."""
+        times = self.times if times is None else times
+        if name == "time":
+            return times
+        if name in (self.run.dtype.names or ()):
+            return np.interp(times, self.run["time"], self.run[name].astype(float))
+        return self.known.get(name, np.nan)
+
+    def draw(self, axes: Any, k: int) -> None:
+        """Frame k, what is nearer over what is behind it."""
+        self.view.set(axes, np.concatenate([s.covers(k) for s in self.shapes]))
+        for shape in in_order(self.shapes, k):
+            self.view.draw(axes, shape, k)
+        if self.in_space:
+            self.view.axes_of_space(axes, self.shapes[0].seen)
+
+
+def sketch(picture: Mapping[str, Any], run: Any, known: Mapping[str, Any]) -> Any:
+    """The picture where a run begins, as a matplotlib Figure; see Stage."""
+    from matplotlib.figure import Figure
+
+    stage = Stage(picture, run, known, np.array([float(run["time"][0])]), labels=True)
+    width = min(WIDE, max(HIGH / stage.view.aspect, WIDE / 2))
+    figure = Figure(figsize=(width, min(HIGH, max(width * stage.view.aspect, 0.5))))
+    stage.draw(figure.add_axes((0, 0, 1, 1)), 0)
+    return figure
+
+
+SIDE, DOTS = 1.28, 100  # in, and dots an inch
+# of a point: further digits of a place are seen by nobody
+TENTH = re.compile(rb"(\d+\.\d)\d+")
+
+
+def icon(prepared: Prepared) -> dict[str, bytes]:
+    """Path in the FMU -> file: as pixels and as SVG; nothing for a model without a picture, or with one that
+    has no place at the start."""
+    picture = picture_of(prepared, forces=False)
+    if picture is None:
+        return {}
+    places, shapes = _places(prepared), []
+    for s in picture["shapes"]:
+        if names_in(s) <= places.keys():
+            shapes.append(Moving(s, places.__getitem__, 1))
+    return _drawn(shapes) if shapes else {}
+
+
+def _places(prepared: Prepared) -> dict[str, float]:
+    """What is known of the start by name: as it is described, and consistent coordinates."""
+    given = {v.name: v.start for v in prepared.table.variables if not isinstance(v.start, str)}
+    known = {name: float(x) for name, x in given.items() if x is not None}
+    (u, p), begun = posed(prepared).values, prepared.structure.start
+    at, q, _ = expanded(at_start(prepared.examined, begun.q, u, p), begun.q, begun.v)
+    return known | dict(zip(at.system.coordinates, q.tolist(), strict=True)) | {"time": 0.0}
+
+
+def _drawn(shapes: list[Moving]) -> dict[str, bytes]:
+    """The same bytes for the same shapes."""
+    import matplotlib
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(SIDE, SIDE), dpi=DOTS)
+    FigureCanvasAgg(figure)
+    axes: Any = figure.add_axes((0, 0, 1, 1))
+    view = View(shapes, labels=False)
+    view.set(axes, np.empty((0, 3)))
+    for shape in in_order(shapes, 0):
+        view.draw(axes, shape, 0)
+    pixels, lines = io.BytesIO(), io.BytesIO()
+    untold = dict.fromkeys(("Date", "Creator", "Format", "Type"))
+    with matplotlib.rc_context({"svg.hashsalt": "lagfmu"}):
+        figure.savefig(pixels, format="png", transparent=True, metadata={"Software": None})
+        figure.savefig(lines, format="svg", transparent=True, metadata=untold)
+    return {
+        f"{ICON}.png": pixels.getvalue(),
+        f"{ICON}.svg": TENTH.sub(rb"\1", lines.getvalue()),
+    }

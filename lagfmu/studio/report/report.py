@@ -2,23 +2,163 @@
 
 from __future__ import annotations
 
+import io
 import os
+import re
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ...errors import UsageError
-from ...files import write_whole
+import numpy as np
+from markupsafe import Markup
+
+from ... import names
+from ...errors import SimulationError, UsageError
+from ...files import foreign, write_whole
 from ...fmu.write import as_fmu
 from ...model.model import Model
 from ...model.scene import Scene
 from ...page.template import template
-from ...verification.check import Verification
+from ...verification.check import Check, Verification
+from ...verification.plot import COLOURS, figure_of
 from ...verification.reference import Driven, Reference
-from . import figures, tables
-from .findings import Findings, findings
+from ...verification.result import as_text
+from ..live.page import facts
+from ..live.view import sketch
+from ..sweep.plot import figure_of as of_study
+from ..sweep.results import happened, numbers, one_by_one, read_rows, varied
+from .findings import (
+    Findings,
+    accuracy,
+    constraints,
+    events,
+    extremes,
+    findings,
+    forces,
+    settings,
+    uncovered,
+)
 from .pdf import printed
-from .study import Study, study_in
+
+MOST = 12  # curves of one figure
+FEW = 20  # points that are marked
+QUIET = "#5b6570"
+
+
+def _svg(figure: Any, title: str) -> Markup:
+    """A figure inline; what reads the page aloud says `title`."""
+    import matplotlib as mpl
+
+    text = io.StringIO()
+    with mpl.rc_context({"svg.hashsalt": title, "svg.fonttype": "none"}):
+        figure.savefig(text, format="svg", metadata={"Date": None})
+    drawn = text.getvalue()[text.getvalue().index("<svg") :]
+    drawn = re.sub(r'(<svg[^>]*?) width="[^"]*" height="[^"]*"', r"\1", drawn, count=1)
+    width = figure.get_figwidth() * 96
+    label = Markup.escape(title)
+    return (
+        Markup(f'<figure style="max-width:{width:.0f}px" role="img" aria-label="{label}">')
+        + Markup(_own_names(drawn, title))
+        + Markup("</figure>")
+    )
+
+
+def _own_names(drawn: str, title: str) -> str:
+    """Identifiers that no other figure of the page has: matplotlib calls groups alike in each."""
+    mark = re.sub(r"\W", "", title)
+    drawn = re.sub(r'\bid="([^"]+)"', rf'id="{mark}-\1"', drawn)
+    drawn = re.sub(r'(xlink:href="#|href="#)', rf"\g<1>{mark}-", drawn)
+    return drawn.replace("url(#", f"url(#{mark}-")
+
+
+def _mechanism(found: Findings) -> Markup | None:
+    """The model's picture where the run begins; None without one."""
+    if found.told.picture is None:
+        return None
+    known = facts(found.told.description, found.told.picture, found.told.preset)["variables"]
+    starts = {v["name"]: v["start"] for v in known} | dict(found.given)
+    return _svg(sketch(found.told.picture, found.run, starts), "The mechanism at its start")
+
+
+def _curves(found: Findings) -> list[tuple[str, Markup]]:
+    """Forces, and the motion, along the run with its events."""
+    known = list(found.run.dtype.names or ())
+    preset = [n for n in (found.told.preset or {}).get("curves", ()) if n in known]
+    held, own, drawn = forces(found), names.of_interest(known), []
+    for title, push in (("Forces of constraint", True), ("Motion", False)):
+        told = ([n for n in of if (n in held) == push] for of in (preset, own))
+        if chosen := next(filter(None, told), held if push else []):
+            figure = figure_of(found.run, found.units, chosen[:MOST])
+            drawn.append((title, _svg(figure, title)))
+    return drawn
+
+
+def _misses(checks: Sequence[Check]) -> list[tuple[str, Markup]]:
+    """Of each statement that fails: what was found, and what was expected."""
+    import matplotlib as mpl
+    from matplotlib.figure import Figure
+
+    from ...verification.figure import STYLE
+
+    drawn = []
+    for k, check in enumerate(checks):
+        if check.missed is None:
+            continue
+        with mpl.rc_context(STYLE | {"font.size": 10}):
+            figure = Figure(figsize=(7.0, 2.4), layout="constrained")
+            panel = figure.subplots()
+            time, actual, expected = check.missed.time, check.missed.actual, check.missed.expected
+            mark = "." if len(time) < FEW else ""
+            panel.plot(time, expected, color=QUIET, lw=3, alpha=0.4, label="expected", marker=mark)
+            panel.plot(time, actual, color=COLOURS[6], lw=1.4, label="found", marker=mark)
+            panel.set_xlabel("time [s]")
+            panel.legend(frameon=False, loc="upper left", bbox_to_anchor=(1.01, 1.0))
+            drawn.append((check.name, _svg(figure, f"missed {k}")))
+    return drawn
+
+
+@dataclass(frozen=True)
+class Study:
+    """`rows`: name, smallest, median and largest value, unit; `facts`: how it was made."""
+
+    name: str
+    runs: int
+    refused: int
+    rows: list[tuple[str, ...]]
+    facts: list[tuple[str, str]]
+    figure: Markup
+
+
+def study_in(path: Path) -> Study:
+    """Of a .parquet or .csv file that `sweep` wrote.  Raises SimulationError for another."""
+    found = read_rows(path)
+    runs = one_by_one(found)
+    status = runs["status"].values
+    rows = []
+    for n in (*varied(runs), *numbers(found)):
+        values = np.asarray(runs[n].values if n in runs.coords else happened(runs, n), dtype=float)
+        values = values[np.isfinite(values)]
+        cells = (values.min(), np.median(values), values.max()) if len(values) else ()
+        rows.append(
+            (n, *([as_text(x) for x in cells] or ["never"] * 3), runs[n].attrs.get("units", ""))
+        )
+    with foreign(
+        lambda said: SimulationError(
+            f"{str(path)!r} cannot be drawn ({said}): expected runs of a sweep, with numbers of usual sizes"
+        )
+    ):
+        figure = _svg(of_study(found), "The study")
+    facts = [(k.replace("_", " "), str(v)) for k, v in found.attrs.items() if v]
+    return Study(
+        Path(found.attrs.get("fmu", path.name)).stem,
+        len(status),
+        int((status != "ok").sum()),
+        rows,
+        facts,
+        figure,
+    )
+
 
 ENDINGS = (".html", ".pdf")
 STUDIES = (".parquet", ".csv")
@@ -51,7 +191,7 @@ def report(
     if path.suffix not in ENDINGS:
         raise UsageError(f"{str(path)!r}: expected a file {' or '.join(ENDINGS)}")
     if isinstance(source, (str, os.PathLike)) and Path(source).suffix in STUDIES:
-        page = rendered(None, study_in(Path(source)))
+        page = _rendered(None, study_in(Path(source)))
     else:
         with as_fmu(source, scene, peaks=PEAKS) as fmu:
             named = fmu if isinstance(source, Model) else Path(source)
@@ -66,33 +206,33 @@ def report(
                 reference=reference,
                 statements=statements,
             )
-            page = rendered(found, None if study is None else study_in(Path(study)))
+            page = _rendered(found, None if study is None else study_in(Path(study)))
     write_whole(path, printed(page, str(path)) if path.suffix == ".pdf" else page.encode())
     return path
 
 
-def rendered(found: Findings | None, study: Study | None) -> str:
+def _rendered(found: Findings | None, study: Study | None) -> str:
     """The page."""
     about: dict[str, Any] = {"study": study}
     if found is None:
         assert study is not None
         return template("studio/report/study.html.j2").render(name=study.name, **about)
-    rows, continuous = tables.extremes(found)
+    rows, continuous = extremes(found)
     checks = () if found.verification is None else found.verification.checks
     return template("studio/report/report.html.j2").render(
         name=found.description.modelName,
         described=found.description.description or "",
         found=found,
-        picture=figures.mechanism(found),
-        curves=figures.curves(found),
+        picture=_mechanism(found),
+        curves=_curves(found),
         forces=rows,
         continuous=continuous,
-        events=tables.events(found),
-        constraints=tables.constraints(found),
-        settings=tables.settings(found),
-        accuracy=tables.accuracy(found),
-        misses=figures.misses(checks),
-        uncovered=tables.uncovered(found),
+        events=events(found),
+        constraints=constraints(found),
+        settings=settings(found),
+        accuracy=accuracy(found),
+        misses=_misses(checks),
+        uncovered=uncovered(found),
         **about,
     )
 
@@ -100,7 +240,6 @@ def rendered(found: Findings | None, study: Study | None) -> str:
 def verified(results: Sequence[tuple[str, Verification | None, str]]) -> str:
     """The page of `lagfmu verify --html`: of each file what was found, or why nothing was."""
     told = [
-        (file, found, why, figures.misses(found.checks) if found else [])
-        for file, found, why in results
+        (file, found, why, _misses(found.checks) if found else []) for file, found, why in results
     ]
     return template("studio/report/verified.html.j2").render(results=told)

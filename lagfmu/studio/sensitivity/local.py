@@ -42,6 +42,43 @@ from ...page.table import as_text, new_table
 from ...prepare.starts import tell
 from ...verification.reference import Driven, driven
 
+MOST = 12  # bars of one output
+
+
+def tornado(
+    bars: Mapping[str, Sequence[tuple[str, float]]],
+    label: str,
+    title: str,
+    out: Any = None,
+    errors: Mapping[str, Mapping[str, float]] | None = None,
+) -> Any:
+    """A panel an output with its bars (name, length), the first on top, and `errors` about their ends; a
+    Figure, or with `out` the file.  Raises BuildError if it cannot be written."""
+    import matplotlib as mpl
+
+    from ...verification.figure import STYLE, Drawn, plain, save
+    from ...verification.plot import COLOURS
+
+    shown = {o: [b for b in rows if np.isfinite(b[1])][:MOST] for o, rows in bars.items()}
+    heights = [0.6 + 0.28 * max(len(rows), 1) for rows in shown.values()]
+    with mpl.rc_context(STYLE | {"font.size": 10}):
+        figure = Drawn(figsize=(7.5, 0.6 + sum(heights)), layout="constrained")
+        panels = figure.subplots(len(shown), 1, squeeze=False, height_ratios=heights)[:, 0]
+        for panel, (output, rows) in zip(panels, shown.items(), strict=True):
+            places = np.arange(len(rows))[::-1]
+            lengths = [length for _, length in rows]
+            colours = [COLOURS[0] if x >= 0 else COLOURS[1] for x in lengths]
+            spread = None if errors is None else [errors[output][n] for n, _ in rows]
+            panel.barh(places, lengths, color=colours, xerr=spread, height=0.7)
+            panel.set_yticks(places, [plain(n) for n, _ in rows])
+            panel.axvline(0, color="#48525e", lw=1)
+            panel.set_title(plain(output), loc="left", fontsize=10)
+            panel.grid(visible=False, axis="y")
+        panels[-1].set_xlabel(plain(label))
+        figure.suptitle(plain(title), fontsize=11)
+        return figure if out is None else save(figure, Path(out))
+
+
 Floats = NDArray[np.float64]
 TOLERANCE = 1e-11  # of the runs: their noise limits the differences
 ALL = "all"
@@ -122,7 +159,6 @@ class Sensitivity:
 
     def plot(self, out: Any = None) -> Any:
         """Bars of the relative derivatives, the longest on top: a matplotlib Figure, or a file `out`."""
-        from .plot import tornado
 
         bars = [
             [(list(self.points)[k], float(self.relative[i, k])) for k in self.order(i)]
@@ -224,7 +260,7 @@ def sensitivity(
     with made_for(source, of, to, scene) as path, Session(path) as session:
         description, rules, given = session.description, session.rules, dict(start_values or {})
         variables = {v.name: v for v in description.modelVariables}
-        asked = settable(variables, rules) if to in (ALL, [ALL], (ALL,)) else list(to)
+        asked = _settable(variables, rules) if to in (ALL, [ALL], (ALL,)) else list(to)
         _check(variables, rules, of, asked, given)
         check_inputs(inputs, rules, session.inputs)
         warn_of_rates(inputs, rules)
@@ -274,10 +310,10 @@ def _parameters_alone(fmu: Path) -> list[str]:
         if len(run.rows) == 0 or run.rows[names.SENSITIVITY_VALID][0]:
             return []
     rules = described_rules(description)
-    return [n for n in settable(variables, rules) if variables[n].causality == "parameter"]
+    return [n for n in _settable(variables, rules) if variables[n].causality == "parameter"]
 
 
-def settable(variables: Mapping[str, Any], rules: Mapping[str, Rule]) -> list[str]:
+def _settable(variables: Mapping[str, Any], rules: Mapping[str, Rule]) -> list[str]:
     """Real parameters and start values, but for the solver's."""
     return [
         n

@@ -18,8 +18,8 @@ from rich.table import Table
 from ...errors import SettingError, SimulationError
 from ...page.table import as_text, new_table
 from ...prepare.starts import tell
+from ..sweep.results import happened
 from ..sweep.sweep import sweep
-from ..sweep.table import happened
 
 METHODS = {"morris": ("mu_star", "sigma"), "sobol": ("S1", "ST")}
 CONFIDENCE = {"mu_star": "mu_star_conf", "S1": "S1_conf", "ST": "ST_conf"}
@@ -85,7 +85,7 @@ class Ranges:
 
     def plot(self, out: Any = None) -> Any:
         """Bars of the main index, the longest on top: a matplotlib Figure or, with `out`, a file."""
-        from .plot import tornado
+        from .local import tornado
 
         bars = {
             o: [(p, rows[p][self.main]) for p in self.order(o)] for o, rows in self.indices.items()

@@ -7,7 +7,7 @@ times as the FMU's default experiment does at its default values.
 Two runs that must agree are compared with what the problem itself makes of small changes: a third
 run, whose start values are shifted by SHIFT of their size, shows the amplification; a difference is
 right up to SAFETY * tol * max(1, N) times (1 + amplification so far), relative to the largest
-magnitude of the column.  N as in closed_forms.py.
+magnitude of the column.  N as in invariants.py.
 """
 
 from __future__ import annotations
@@ -27,10 +27,8 @@ from ...fmu.session import RefusalError, Session
 from ...fmu.target import PYTHON
 from ...verification.closed_forms import applies
 from ...verification.evaluate import alone
-from .closed_forms import EQUATION, judged, laws
-from .facts import Facts, facts_of
-from .judge import EPS, ROUNDING, Check, invariants, lost
-from .player import Drive, Run, Values, opened, play
+from .invariants import EPS, EQUATION, ROUNDING, Check, invariants, judged, laws, lost
+from .specimen import Drive, Facts, Run, Values, facts_of, opened, play
 
 SHIFT = 1e-6
 SAFETY = 30.0

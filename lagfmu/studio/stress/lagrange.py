@@ -41,8 +41,8 @@ from ...model.model import Contact, Friction, Model, Nonholonomic, name_of
 from ...model.speeds import quaternions
 from ...numeric.closed import across
 from ...prepare.prepare import Prepared
-from .closed_forms import EQUATION, MASSLESS, RATE, SLOW, magnitude
-from .facts import beside
+from .invariants import EQUATION, MASSLESS, RATE, SLOW, magnitude
+from .specimen import beside
 
 ROUNDING = 1e-13  # relative to those terms; see closed_forms.LEEWAY
 CONE = 1e-12  # of Coulomb's cone

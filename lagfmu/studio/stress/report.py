@@ -11,7 +11,7 @@ from rich.table import Table
 
 from ...page.table import new_table
 from ...verification.junit import Case, Report
-from .probe import CONSISTENT, REFUSED, RIGHT, UNFINISHED, WRONG, Verdict
+from .probes import CONSISTENT, REFUSED, RIGHT, UNFINISHED, WRONG, Verdict
 
 FORMAT = 2
 VERDICTS = (RIGHT, CONSISTENT, REFUSED, WRONG, UNFINISHED)
@@ -71,7 +71,7 @@ def table(found: Stressed) -> Table:
             f"[{COLOURS[row.verdict]}]{row.verdict}[/]",
             str(row.checks),
             _ratio(row),
-            escape(remark(row)),
+            escape(_remark(row)),
         )
     return drawn
 
@@ -89,7 +89,7 @@ def _ratio(row: Verdict) -> str:
     return f"{row.ratio:.1e}" if row.ratio else ""
 
 
-def remark(row: Verdict) -> str:
+def _remark(row: Verdict) -> str:
     """What came nearest to its limit, or the reason; of a refusal, whether to worry."""
     nearest = row.closest if row.verdict == RIGHT and row.ratio else ""
     advice = ""
@@ -100,7 +100,7 @@ def remark(row: Verdict) -> str:
 
 def report(file: str, found: Stressed) -> Report:
     """A case a probe: wrong fails, unfinished is skipped, a clear refusal is as good as right."""
-    return Report(file, found, [_case(r) for r in found.rows], data(found))
+    return Report(file, found, [_case(r) for r in found.rows], _data(found))
 
 
 def _case(row: Verdict) -> Case:
@@ -109,7 +109,7 @@ def _case(row: Verdict) -> Case:
     return Case(row.probe, row.family, failure, skipped, row.seconds)
 
 
-def data(found: Stressed) -> dict[str, Any]:
+def _data(found: Stressed) -> dict[str, Any]:
     """Everything, as JSON knows it."""
     return {
         "format": FORMAT,

@@ -10,8 +10,7 @@ from typing import Any
 
 from ..host import serve
 from .bench import Bench
-from .probe import Probe, Verdict, attempt, verdict
-from .probes import probes
+from .probes import Probe, Verdict, attempt, probes, verdict
 
 
 def probing() -> Callable[[Any], Verdict | None]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...errors import SimulationError
 from ...model.units import for_reading
-from .table import INFINITE, happened, numbers, one_by_one, varied
+from .results import INFINITE, happened, numbers, one_by_one, varied
 
 FIGURES = (".svg", ".png", ".pdf")
 FAILED, NOTHING = "#c0392b", "#e8e8e8"

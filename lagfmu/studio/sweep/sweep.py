@@ -39,10 +39,8 @@ from ...numeric.tolerance import tolerance_problem
 from ...verification.reference import Driven, driven
 from .design import Design, Values, design, number
 from .engine import asked_to_stop, closed, connected, distributed, local
-from .keep import kept as parsed
-from .keep import peaked
-from .parts import Parts
-from .table import Layout, dataset, write_rows
+from .results import Layout, Parts, dataset, peaked, write_rows
+from .results import kept as parsed
 
 MOST = 2000  # runs in a chunk
 FEWEST = 100  # chunks, of a large sweep

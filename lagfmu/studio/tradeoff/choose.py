@@ -7,25 +7,100 @@ scene's method and formulation stay.
 
 from __future__ import annotations
 
+import random
 import tempfile
 from bisect import bisect_left
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
+from ... import names
 from ...errors import BuildError, SimulationError
+from ...fmu.read import Trajectory, joint_starts, kind_of
 from ...fmu.session import Session
 from ...fmu.write import write
 from ...methods import METHODS
-from ...model.goal import Goal
+from ...model.goal import HELD_OUT_MARGIN, MARGIN, Goal
 from ...model.model import Model
 from ...model.scene import Scene
+from ...page.template import template
 from ...prepare.prepare import prepare
 from ...verification.simulate import steps_of
-from .held_out import Case, cases
-from .observe import observe, opened
-from .quantities import selected
-from .reference import Reference, refer, wider
-from .setting import Setting, ladder
+from .reference import Reference, Setting, ladder, observe, opened, refer, selected, wider
+
+SHARE = 0.05  # of a value, or of its largest magnitude in the scene where all start values are zero
+CASES = 3
+TRIES = 40
+
+
+@dataclass(frozen=True)
+class Case:
+    """The FMU at other values: what was set, and what it should report there."""
+
+    values: Mapping[str, float]
+    reference: Reference
+
+
+def _cases(session: Session) -> list[Case]:
+    """Other points, with their references.  Raises SimulationError if it cannot be run there."""
+    scene = observe(session, _built(session))
+    drawn = [other_values(session, scene, random.Random(k)) for k in range(CASES)]
+    return [Case(values, refer(session, values)) for values in drawn]
+
+
+def other_values(session: Session, scene: Trajectory, chance: random.Random) -> dict[str, float]:
+    """Every parameter and start value, moved by up to SHARE, within its bounds.
+
+    Start values of zero stay, unless all are zero.  The FMU puts what misses the constraints back on
+    them.  Values that it refuses, or at which other contacts are closed at the start, are drawn again.
+    """
+    reason = "other contacts are closed at the start"
+    for _ in range(TRIES):
+        values = _drawn(session, scene, chance)
+        try:
+            begun = observe(session, _built(session), values, stop=session.experiment.step_size)
+        except SimulationError as error:
+            reason = str(error)
+            continue
+        contacts = names.those(begun.dtype.names or (), names.CONTACT)
+        if all(begun[n][0] == scene[n][0] for n in contacts):
+            return values
+    raise SimulationError(
+        f"{session.description.modelName}: no other start values or parameters were found within "
+        f"{SHARE:.0%} of the scene's that the FMU starts with ({reason})"
+    )
+
+
+def _built(session: Session) -> Setting:
+    return Setting("", 0.0, 0.0, session.experiment.step_size)
+
+
+def _drawn(session: Session, scene: Trajectory, chance: random.Random) -> dict[str, float]:
+    given = [
+        v
+        for v in session.description.modelVariables
+        if kind_of(v) == "Real" and v.start is not None and names.read(v.name).head != names.SOLVER
+    ]
+    outputs, joints = scene.dtype.names or (), joint_starts(session.description)
+    starts = [
+        v
+        for v in given
+        if v.initial in ("exact", "approx") and v.name in outputs and v.name not in joints
+    ]
+    still = all(float(v.start) == 0 for v in starts)
+    values: dict[str, float] = {}
+    for v in given:
+        share, value = SHARE * chance.uniform(-1, 1), float(v.start)
+        moved = value * (1 + share)
+        if v in starts and still:
+            moved = share * float(np.abs(scene[v.name]).max())
+        elif v not in starts and v.causality != "parameter":
+            continue
+        if moved != value and not session.rules[v.name].problem(moved):
+            values[v.name] = moved
+    return values
+
 
 TOLERANCES = tuple(float(f"{d}e-{k}") for k in range(3, 14) for d in (10, 5, 2))  # 1e-2 ... 2e-13
 ATTEMPTS = 6
@@ -86,11 +161,11 @@ def _chosen(session: Session, scene: Scene, goal: Goal, say: Tick) -> Choice:
     def holds(k: int) -> bool:
         if k not in tried:
             say(str(dials[k]), len(tried), len(dials).bit_length())
-            tried[k] = attempt(session, dials[k], reference, names)
+            tried[k] = _attempt(session, dials[k], reference, names)
         return tried[k].error <= goal.on_the_scene
 
     first = bisect_left(range(len(dials)), True, key=holds)
-    others = cases(session) if first < len(dials) else []
+    others = _cases(session) if first < len(dials) else []
     failed: list[tuple[Trial, float]] = []
     for k in range(first, len(dials)):
         if len(failed) == ATTEMPTS:
@@ -100,7 +175,7 @@ def _chosen(session: Session, scene: Scene, goal: Goal, say: Tick) -> Choice:
         found: list[tuple[Case, Trial]] = []
         for case in others:
             say(f"{dials[k]} at held-out values", len(found), len(others))
-            found.append((case, attempt(session, dials[k], case.reference, names, case.values)))
+            found.append((case, _attempt(session, dials[k], case.reference, names, case.values)))
         worst = max(trial.error for _, trial in found)
         if worst <= goal.held_out:
             tolerance, trials = dials[k].tolerance, tuple(tried[j] for j in sorted(tried))
@@ -112,7 +187,7 @@ def _chosen(session: Session, scene: Scene, goal: Goal, say: Tick) -> Choice:
     raise BuildError(_nothing(scene, goal, list(tried.values()), failed))
 
 
-def attempt(
+def _attempt(
     session: Session,
     setting: Setting,
     reference: Reference,
@@ -148,3 +223,17 @@ def _nothing(
         "or shorten the scene"
     )
     return "; ".join(lines)
+
+
+def section(choice: Choice) -> str:
+    """HTML: what was asked, what was chosen, the trials, the held-out cases."""
+    return template("page/choice.html.j2").render(
+        goal=choice.goal,
+        choice=choice,
+        reference=choice.reference,
+        margin=f"{MARGIN:g}",
+        held_out_margin=f"{HELD_OUT_MARGIN:g}",
+        values=[
+            ", ".join(f"{n} = {v:.4g}" for n, v in case.values.items()) for case, _ in choice.cases
+        ],
+    )

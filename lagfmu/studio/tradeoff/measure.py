@@ -2,31 +2,55 @@
 
 The settings take turns, so that a busy spell of the machine falls on all of them alike; the least time
 counts, for other work on the machine only adds to it.
+
+A tradeoff as a table for the terminal, as JSON with everything, as a pipeline's suite.
+
+Work against precision: wall time over error, logarithmic, one line a method.
+
+To the right is more accurate, down is faster.  Ringed is what won, named by its tolerance or step; the
+hatched part lies below the reference's own error.
 """
 
 from __future__ import annotations
 
+import platform
 import random
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.table import Table
 
 from ... import names
 from ...errors import SimulationError, VerificationError
 from ...fmu.closed_forms import CarriedForm
 from ...fmu.read import file_stem, numbers_of, target_in
 from ...fmu.session import Session
-from ...methods import FIXED_STEP, INTEGRATORS
+from ...methods import FIXED_STEP, INTEGRATORS, MENU
+from ...page.table import new_table
 from ...verification.closed_forms import check_closed_form
+from ...verification.junit import Case, Report
 from ...verification.simulate import steps_of
 from ...verification.verify import closed_forms_in
 from .choose import Tick
-from .observe import observe, opened, seconds
-from .quantities import GROUPS, MULTIPLIER
-from .reference import Reference, refer
-from .setting import HALVINGS, Setting, ladder
+from .reference import (
+    FINER,
+    GROUPS,
+    HALVINGS,
+    MULTIPLIER,
+    REFERENCE,
+    Reference,
+    Setting,
+    ladder,
+    observe,
+    opened,
+    refer,
+    seconds,
+)
 
 COARSE, DECADES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11), tuple(float(f"1e-{k}") for k in range(3, 14))
 FEWEST = 3  # runs of each setting that are timed whatever it takes
@@ -120,7 +144,7 @@ def measure(fmu: Path, plan: Plan | None = None, tick: Tick | None = None) -> Tr
         points, notes = _errors(session, reference, closed_forms_in(fmu), plan, say)
         read = [q.name for q in reference.known]
         work = [partial(seconds, session, p.setting, read) for p in points]
-        timed = take_turns(work, plan, say)
+        timed = _take_turns(work, plan, say)
         return Tradeoff(
             name=file_stem(session.description),
             target=target_in(fmu),
@@ -174,7 +198,7 @@ def _largest(point: Point) -> float:
     return max(point.errors.values(), default=0.0)
 
 
-def take_turns(
+def _take_turns(
     work: Sequence[Callable[[], float]], plan: Plan, say: Tick
 ) -> list[tuple[float, ...]]:
     """Wall times [s] of each piece of work, done in rounds, each round in another order.
@@ -195,3 +219,162 @@ def take_turns(
         for j in order:
             seconds[j].append(sum(work[j]() for _ in range(often[j])) / often[j])
     return [tuple(s) for s in seconds]
+
+
+FORMAT = 2
+
+
+def table(found: Tradeoff) -> Table:
+    """One line a setting: tolerance or step, error, cost; ● won, ✗ misses a closed form."""
+    won = found.front
+    error = "error of λ" if found.headline == MULTIPLIER else f"error of {found.headline}"
+    drawn = new_table(
+        f"{found.name} ({found.target}), every {found.points[0].setting.communication:.3g} s",
+        *("", "method", "tolerance", error, "steps", "ms/s"),
+        words=("", "method"),
+    )
+    method = ""
+    for point in found.points:
+        if method not in ("", point.setting.method):
+            drawn.add_section()
+        method = point.setting.method
+        drawn.add_row(
+            ("●" if point in won else "") + ("✗" if point.missed else ""),
+            method,
+            point.setting.dial,
+            f"{found.error(point):.1e}",
+            str(point.steps),
+            _digits(1e3 * point.cost / found.simulated),
+            style="bold" if point in won else None,
+        )
+    return drawn
+
+
+def _digits(value: float) -> str:
+    """Three digits, and no exponent above a thousand."""
+    return f"{value:.3g}" if value < 1e3 else f"{value:.0f}"
+
+
+def remarks(found: Tradeoff) -> list[str]:
+    """What the columns are, how right the reference is, what was missed, refused or cut."""
+    own = max(found.reference.own.values(), default=0.0)
+    lines = [
+        f"error: relative to the largest magnitude, against a run at {REFERENCE:.0e} whose own error is "
+        f"{own:.0e} (a run at {FINER:.0e} differs by that); ms/s: wall time per simulated second through "
+        "fmpy, the least; ● won: no setting is both faster and more accurate"
+    ]
+    lines += [f"✗ {p.setting}: {'; '.join(p.missed)}" for p in found.points if p.missed]
+    return [*lines, *found.notes]
+
+
+def report(file: str, found: Tradeoff) -> Report:
+    """A case a setting that was measured, none of which fails: a trade-off measures and does not judge.
+
+    An FMU that runs with no setting at all could not be run.
+    """
+    if not found.points:
+        return Report(file, error=f"no setting could be measured: {'; '.join(found.notes)}")
+    cases = [Case(str(p.setting), found.name, seconds=p.cost) for p in found.points]
+    return Report(file, found, cases, _data(found))
+
+
+def _data(found: Tradeoff) -> dict[str, Any]:
+    """Everything, as JSON knows it: times in s, relative errors."""
+    reference, won = found.reference, found.front
+    return {
+        "format": FORMAT,
+        "fmu": found.name,
+        "target": found.target,
+        "simulated": found.simulated,
+        "machine": f"{platform.system()} {platform.machine()}",
+        "reference": {
+            q.name: asdict(q) | {"own": reference.own[q.name], "scale": reference.scale[q.name]}
+            for q in reference.known
+        },
+        "points": [asdict(p) | {"cost": p.cost, "won": p in won} for p in found.points],
+        "notes": list(found.notes),
+    }
+
+
+COLOURS = {m.name: m.colour for m in MENU if m.colour}
+MARKERS = {m.name: m.marker for m in MENU if m.marker}
+WORTH = 0.1  # part of the error of the last named point at which the next one is named
+
+
+def draw(found: Tradeoff, out: Path) -> Path:
+    """Write the figure (the ending says the format).  Raises BuildError if it cannot be."""
+    import matplotlib as mpl
+    from matplotlib.figure import Figure
+
+    from ...verification.figure import STYLE, plain, save
+
+    factor = 1e3 / found.simulated
+    with mpl.rc_context(STYLE | {"font.size": 10, "hatch.linewidth": 0.4}):
+        figure = Figure(figsize=(6.4, 4.2), layout="constrained")
+        axis = figure.subplots()
+        axis.set_xscale("log")
+        axis.set_yscale("log")
+        for method in COLOURS:
+            own = [p for p in found.points if p.setting.method == method]
+            _line(axis, found, own, factor)
+        _winners(axis, found, factor)
+        _limits(axis, found)
+        what = "λ" if found.headline == MULTIPLIER else found.headline
+        axis.set_xlabel(f"largest error of {plain(what)}, relative to its largest magnitude")
+        axis.set_ylabel("wall time per simulated second in ms")
+        step = found.points[0].setting.communication
+        axis.set_title(
+            f"{plain(found.name)} ({found.target} FMU), every {step:.3g} s", fontsize=10.5
+        )
+        figure.legend(loc="outside right upper", frameon=False, fontsize=9)
+        return save(figure, out)
+
+
+def _line(axis: Any, found: Tradeoff, points: Sequence[Point], factor: float) -> None:
+    """One method: wall times over errors."""
+    known = [p for p in points if np.isfinite(found.error(p))]
+    if known:
+        method = known[0].setting.method
+        axis.plot(
+            [found.error(p) for p in known],
+            [factor * p.cost for p in known],
+            color=COLOURS[method],
+            marker=MARKERS[method],
+            markersize=4.5,
+            linewidth=1.6,
+            label=method,
+        )
+
+
+def _winners(axis: Any, found: Tradeoff, factor: float) -> None:
+    """A ring about each, and the tolerance or step below it where it is much better than the one before."""
+    xs = [found.error(p) for p in found.front]
+    ys = [factor * p.cost for p in found.front]
+    ring = {"markerfacecolor": "none", "color": "#222222", "linewidth": 0}
+    axis.plot(xs, ys, "o", markersize=10, label="won", **ring)
+    last = float("inf")
+    for point, x, y in zip(found.front, xs, ys, strict=True):
+        if x > WORTH * last:
+            continue
+        last = x
+        axis.annotate(
+            point.setting.dial,
+            (x, y),
+            (0, -10),
+            textcoords="offset points",
+            ha="center",
+            va="top",
+            fontsize=8,
+            fontweight="bold",
+            color=COLOURS[point.setting.method],
+        )
+
+
+def _limits(axis: Any, found: Tradeoff) -> None:
+    """More accurate to the right; hatched what the reference does not know."""
+    own = [found.reference.own[q.name] for q in found.reference.known if q.group == found.headline]
+    errors = [e for e in map(found.error, found.points) if np.isfinite(e)]
+    lowest, edge = min([*errors, *own]), max(own)
+    axis.axvspan(edge, edge * 1e-9, facecolor="none", edgecolor="#999999", hatch="///")
+    axis.set_xlim(max([*errors, 1e3 * lowest]) * 4, lowest / 6)
+    axis.margins(y=0.15)
