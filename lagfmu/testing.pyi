@@ -1,10 +1,10 @@
 """The names of testing.py, and where they are."""
 
 from .bodies.solid import solid
-from .cli import stress as stress_command
+from .cli import studies as stress_command
 from .cli.app import COMMANDS, app
 from .cli.progress import told
-from .cli.stress import stress
+from .cli.studies import stress
 from .cli.terminal import console
 from .codegen.c import elimination
 from .codegen.c import function as c_function

@@ -8,20 +8,10 @@ import typer
 
 from ..fmu.archive import tool
 from ..verification.exit_codes import EXIT_CODES
-from .commands.build import build
-from .commands.fit import fit
 from .commands.linearize import linearize
-from .commands.new import new
-from .commands.page import page
-from .commands.reference import reference
-from .commands.report import report
-from .commands.sensitivity import sensitivity
-from .commands.show import show
-from .commands.simulate import simulate
-from .commands.stress import stress
-from .commands.sweep import sweep
-from .commands.tradeoff import tradeoff
-from .commands.verify import verify
+from .commands.models import build, new, page, show
+from .commands.runs import reference, report, simulate, verify
+from .commands.studies import fit, sensitivity, stress, sweep, tradeoff
 from .terminal import prepare_streams
 
 COMMANDS = (

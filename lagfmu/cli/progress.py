@@ -1,13 +1,17 @@
-"""How far a study has come, on a terminal and in a log."""
+"""How far a command has come, on a terminal and in a log; and how one ends that judges FMUs: tables for eyes,
+files and an exit code for pipelines.
+"""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
+import typer
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
@@ -18,7 +22,11 @@ from rich.progress import (
 )
 
 from ..errors import UserInterruptError
-from .terminal import console, say
+from ..files import write_whole
+from ..page.table import new_table, print_whole
+from ..verification.check import Verification
+from ..verification.junit import Report, as_json, as_junit, exit_code
+from .terminal import console, errors, say, say_error
 
 FIRST, QUIET = 2.0, 10.0  # [s] until the first line, and between lines, without a terminal
 Tick = Callable[[str, int, int], None]  # what is done, how far, of how many
@@ -96,3 +104,42 @@ def _time(seconds: float) -> str:
         return f"{seconds:.2g} s"
     minutes = round(seconds / 60)
     return f"{minutes} min" if minutes < 100 else f"{seconds / 3600:.1f} h"
+
+
+def finish(command: str, reports: Sequence[Report], json: Path | None, junit: Path | None) -> None:
+    """Write what a pipeline reads, say what could not be run, and end with the exit code."""
+    if json is not None:
+        write_whole(json, as_json(reports).encode())
+    if junit is not None:
+        write_whole(junit, as_junit(f"lagfmu {command}", reports))
+    for one in reports:
+        if one.error:
+            say_error(one.error if one.file in one.error else f"{one.file}: {one.error}")
+    raise typer.Exit(exit_code(reports))
+
+
+def print_verdicts(found: Verification) -> None:
+    """A row a statement, and in words what failed."""
+    from ..verification.verify import OF_THE_FILE
+
+    title = f"{found.name}: {'pass' if found.passed else 'FAIL'}"
+    table = new_table(
+        title, "statement", "largest error", "allowed", "points", "verdict", text=["statement"]
+    )
+    for row, check in found.told():
+        colour = {"pass": "green", "FAIL": "bold red"}.get(check.verdict, "yellow")
+        table.add_row(escape(row[0]), *row[1:4], f"[{colour}]{row[4]}[/]")
+    print_whole(console, table)
+    if all(c.name in OF_THE_FILE for c in found.checks):
+        say(
+            f"{found.name}: the FMU carries no closed forms: its physics was not checked",
+            "note:",
+            "yellow",
+        )
+    if found.left_out:
+        of = f"{found.left_out} of {found.left_out + found.closed_forms} closed forms"
+        told = f"{found.name}: {of} were not checked: this FMU leaves out what they need"
+        say(told, "note:", "yellow")
+    for check in found.checks:
+        if check.failed and check.detail:
+            say(check.detail, f"{escape(found.name)}: {escape(check.name)}:", "red", errors)

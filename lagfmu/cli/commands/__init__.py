@@ -1,2 +1,2 @@
-"""One file a command: its options, and the call.  What it needs is imported when it is called, so that
+"""The options of each command, and the call.  What it needs is imported when it is called, so that
 `lagfmu --help` does not wait for SymPy."""

@@ -1,4 +1,4 @@
-"""`lagfmu build`: the FMUs of a model file, verified."""
+"""Commands for a model file: to start one, to show it, to play it, to build its FMUs."""
 
 from __future__ import annotations
 
@@ -12,27 +12,125 @@ from ...errors import UsageError, VerificationError
 from ...fmu.compiler import HOST, NAMES
 from ...fmu.face import Face
 from ...fmu.target import NATIVE, PYTHON
+from ...model.library import known
+from ...model.library import new as written
 from ...verification.exit_codes import FAILS
-from .. import options
-from ..terminal import console, kilobytes, plainly, say_wrote
+from ..options import (
+    NARROWING,
+    OPTIONS,
+    AddOutput,
+    Arguments,
+    ModelPath,
+    Needs,
+    SceneName,
+    Target,
+    takes,
+)
+from ..terminal import console, kilobytes, plainly, say, say_wrote
 
 if TYPE_CHECKING:
     from ...interface.variables import VariableTable
+    from ...model.model import Model
 
 
-@options.takes(*options.OPTIONS)
+def new(
+    file: Annotated[Path, typer.Argument(help="The Python file to write.")],
+    source: Annotated[
+        str | None,
+        typer.Option(
+            "--from", help=f"A URDF or MJCF file, or a model to copy: {', '.join(known())}."
+        ),
+    ] = None,
+) -> None:
+    """Write a commented model to start from."""
+    with plainly():
+        path = written(file, source)
+        say_wrote(path)
+        say(f"next: lagfmu show {path}")
+
+
+@takes(*(n for n in OPTIONS if n != "name"))
+def show(
+    model: ModelPath,
+    scene: Annotated[str | None, typer.Option(help="Which FMU of the file.")] = None,
+    arguments: Arguments = None,
+    *,
+    needs: Needs,
+    add_output: AddOutput = None,
+) -> None:
+    """Print equations of motion, classification of constraints, degrees of freedom and units.
+
+    For a scene that needs less than everything, print also what is removed and what that saves.
+    """
+    from ...errors import CannotStartError
+    from ...fmu.native import try_start
+    from ...page.text import show as show_prepared
+    from ...page.text import show_what_is_known
+    from ...prepare.prepare import prepare
+    from ...prepare.starts import check_given
+    from ..options import loaded, narrowed
+
+    with plainly():
+        file = loaded(model, add_output, arguments)
+        for s in narrowed(file.called(scene), needs):
+            try:
+                prepared = prepare(file.model, s)
+                untried = try_start(prepared)
+            except CannotStartError as error:
+                show_what_is_known(error.known, console)
+                raise
+            show_prepared(prepared, console, untried)
+            structure = prepared.structure
+            check_given(file.model.name, structure.start.moved, structure.missed)
+
+
+@takes("outputs", "fixed", "inputs")
+def page(
+    target: Annotated[
+        Path, typer.Argument(metavar="MODEL.py|FILE.fmu", help="A model file, or a native FMU.")
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", "-o", help="The file, or its folder; default dist/page/NAME.html."),
+    ] = None,
+    scene: SceneName = None,
+    arguments: Arguments = None,
+    *,
+    needs: Needs,
+    add_output: AddOutput = None,
+) -> None:
+    """Write one HTML file in which the FMU runs: offline, with sliders, curves and the mechanism."""
+    from ...model.file import is_model
+    from ...studio.live.play import write_page
+    from ..options import for_models, loaded, narrowed
+
+    with plainly():
+        source: Model | Path = target
+        shown = None
+        if is_model(target):
+            file = loaded(target, add_output, arguments)
+            source = file.model
+            shown = narrowed(file.called(scene)[:1], needs)[0]
+        else:
+            for_models(target, scene=scene, p=arguments, **needs, add_output=add_output)
+        with console.status("compiling to WebAssembly"):
+            path = write_page(source, out, shown)
+        say_wrote(path, kilobytes(path))
+
+
+@takes(*OPTIONS)
 def build(
-    model: options.ModelPath,
+    model: ModelPath,
     out: Annotated[Path, typer.Option("--out", "-o", help="Output folder.")] = Path("dist"),
     scene: Annotated[
         list[str] | None, typer.Option(help="Only these FMUs of the file; repeatable.")
     ] = None,
-    arguments: options.Arguments = None,
+    arguments: Arguments = None,
     check: Annotated[bool, typer.Option(help="Verify each FMU after building it.")] = True,
     reference: Annotated[
         bool, typer.Option("--reference", help="Put reference results inside (FMI-LS-REF).")
     ] = False,
-    target: options.Target = None,
+    target: Target = None,
     platforms: Annotated[
         list[str] | None,
         typer.Option(
@@ -86,15 +184,14 @@ def build(
         ),
     ] = False,
     *,
-    needs: options.Needs,
-    add_output: options.AddOutput = None,
+    needs: Needs,
+    add_output: AddOutput = None,
 ) -> None:
     """Build the FMUs of a model file into OUT/native/NAME.fmu or OUT/python/NAME.fmu, and verify them."""
     from ...api import package
     from ...prepare.prepare import prepare
-    from ..finish import print_verdicts
-    from ..progress import progress
-    from ..scenes import loaded, narrowed
+    from ..options import loaded, narrowed
+    from ..progress import print_verdicts, progress
 
     failed = False
     places = tuple(n for text in platforms or [HOST] for n in text.replace(",", " ").split())
@@ -114,7 +211,7 @@ def build(
             busy: Any = console.status(what) if s.accuracy is None else progress(console, s.name)
             with busy as shown:
                 prepared = prepare(file.model, s)
-                less = any(needs[n] is not None for n in options.NARROWING)
+                less = any(needs[n] is not None for n in NARROWING)
                 if less and needs["name"] is None:
                     _keep_the_full_one(folder / f"{s.name}.fmu", prepared.table)
                 built = package(
@@ -132,7 +229,7 @@ def build(
                 )
             path, found = built.path, built.verification
             if built.choice is not None:
-                from ..tradeoff import say_chosen
+                from ..studies import say_chosen
 
                 say_chosen(built.choice, console)
             say_wrote(path, kilobytes(path), "built")
