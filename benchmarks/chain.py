@@ -44,7 +44,7 @@ from lagfmu.fmu.native import sources_of
 from lagfmu.fmu.read import read_description
 from lagfmu.fmu.trial import lay_out
 from lagfmu.fmu.write import write
-from lagfmu.mechanics.form import Form
+from lagfmu.mechanics.formulations import Form
 from lagfmu.names import STEPS
 from lagfmu.prepare import prepare as steps
 from lagfmu.prepare.steps import Request

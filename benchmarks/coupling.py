@@ -21,7 +21,7 @@ from fmi3 import Library
 from master import error
 
 import lagfmu
-from lagfmu.verification.figure import STYLE, Drawn, save
+from lagfmu.verification.plot import STYLE, Drawn, save
 
 STEPS = 0.016, 0.008, 0.004, 0.002, 0.001  # s
 PLACES = 8

@@ -14,13 +14,13 @@ __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
 
 
 def _html(thing: Any) -> str:
-    from .page.notebook import html
+    from .page.documentation import html
 
     return html(thing)
 
 
 def _latex(thing: Any) -> str:
-    from .page.notebook import latex
+    from .page.documentation import latex
 
     return latex(thing)
 

@@ -49,8 +49,7 @@ from .studio.report.report import report
 from .studio.sensitivity.local import sensitivity
 from .studio.sweep.sweep import sweep
 from .verification.check import Verification
-from .verification.result import Result
-from .verification.simulate import simulate
+from .verification.simulate import Result, simulate
 from .verification.verify import verify
 
 __all__ = [

@@ -23,7 +23,7 @@ from .model.file import in_scene
 from .model.goal import parse
 from .model.model import Model
 from .model.scene import Scene
-from .page.notebook import html
+from .page.documentation import html
 from .page.table import printed
 from .page.text import show as show_prepared
 from .page.text import show_besides

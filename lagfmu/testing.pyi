@@ -6,12 +6,11 @@ from .cli.app import COMMANDS, app
 from .cli.progress import told
 from .cli.studies import stress
 from .cli.terminal import console
-from .codegen.c import elimination
 from .codegen.c import function as c_function
-from .codegen.c.elimination import Elimination, eliminate, plan
+from .codegen.c import sparsity
 from .codegen.c.equations import model_source
 from .codegen.c.printer import HELPERS, identifiers, number, string
-from .codegen.c.solve import solve_source
+from .codegen.c.sparsity import Elimination, eliminate, plan, solve_source
 from .codegen.py.equations import lower
 from .files import write_whole
 from .fmu import archive, compiler, described
@@ -37,11 +36,9 @@ from .fmu.session import RefusalError, Session
 from .fmu.target import NoCompilerWarning
 from .fmu.terminals import terminals
 from .fmu.write import as_built, write
-from .interface.rules import problems_of
+from .interface.variables import problems_of
 from .mechanics import simplification
-from .mechanics.form import Form
-from .mechanics.formulations.minimal import reduce
-from .mechanics.formulations.nullspace import lambda_free, null_space
+from .mechanics.formulations import Form, lambda_free, null_space, reduce
 from .mechanics.integrability.classify import Kind, pfaffian
 from .mechanics.jumps import jumps_of, with_jumps
 from .model.attitude import Carried, rotation_matrix, written_out
@@ -79,15 +76,22 @@ from .numeric.system import System
 from .page.documentation import page as documentation_page
 from .page.documentation import with_figures
 from .page.notation import Notation, name_latex, name_text
-from .page.packed import pack as pack_picture
-from .page.packed import values as picture_values
-from .page.picture import as_bytes, direction, picture_of, read_picture
-from .page.preset import IN_FMU, preset_of, read_preset
+from .page.picture import (
+    PRESET,
+    direction,
+    picture_bytes,
+    picture_of,
+    preset_of,
+    read_picture,
+    read_preset,
+)
+from .page.picture import pack as pack_picture
+from .page.picture import values as picture_values
 from .page.savings import NATIVE, OPERATIONS, savings
 from .page.table import print_whole
 from .page.text import show as show_in
+from .page.text import wrapped
 from .page.typeset import typeset
-from .page.wrapped import wrapped
 from .prepare.consistency import RedundantConstraintWarning
 from .prepare.prepare import Prepared, prepare
 from .prepare.starts import StartMovedWarning
@@ -136,11 +140,10 @@ from .studio.tradeoff.measure import Plan as TradeoffPlan
 from .studio.tradeoff.measure import Point, Tradeoff, measure
 from .studio.tradeoff.measure import table as tradeoff_table
 from .studio.tradeoff.reference import OWN, Setting, observe, opened, quantities, refer
-from .verification import junit
-from .verification.closed_forms import applies, check_closed_form, landed
-from .verification.evaluate import Compiled
-from .verification.exit_codes import EXIT_CODES, NOT_RUN, TERMINATED, WRONG_USAGE
+from .verification import pipeline
+from .verification.closed_forms import Compiled, applies, check_closed_form, landed
 from .verification.laws import CarriedLaws
+from .verification.pipeline import EXIT_CODES, NOT_RUN, TERMINATED, WRONG_USAGE
 from .verification.plot import COLOURS, figure_of, moments, panels
 from .verification.reference import read_table
 from .verification.simulate import ErrorBarWarning

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from runtime import compile_library
 
-from lagfmu.testing import elimination, solve_source
+from lagfmu.testing import solve_source, sparsity
 
 EPS = np.finfo(float).eps
 DOUBLES = ctypes.POINTER(ctypes.c_double)
@@ -40,7 +40,7 @@ class Solve:
     def __init__(self, folder, n, entries):
         self.n, self.entries = n, entries
         self.m = 1 + max((k for k, _ in entries), default=-1)
-        plan = elimination.plan(n, self.m, [(i, i) for i in range(n)], entries)
+        plan = sparsity.plan(n, self.m, [(i, i) for i in range(n)], entries)
         text = solve_source("solve", n, entries, plan)
         assert text is not None
         assert all(len(line) <= 100 for line in text.splitlines())
@@ -126,7 +126,7 @@ def test_only_small_plain_systems_are_written_out():
     for links, small in ((16, True), (128, False)):
         entries = chain(links)
         n = 2 * links
-        plan = elimination.plan(n, links, [(i, i) for i in range(n)], entries)
+        plan = sparsity.plan(n, links, [(i, i) for i in range(n)], entries)
         assert (solve_source("solve", n, entries, plan) is not None) == small
-    coupled = elimination.plan(2, 1, [(0, 0), (1, 0), (1, 1)], [(0, 0), (0, 1)])
+    coupled = sparsity.plan(2, 1, [(0, 0), (1, 0), (1, 1)], [(0, 0), (0, 1)])
     assert solve_source("solve", 2, [(0, 0), (0, 1)], coupled) is None

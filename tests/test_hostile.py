@@ -31,8 +31,8 @@ from lagfmu.testing import (
     app,
     compiler,
     film,
-    junit,
     parse_unit,
+    pipeline,
     told_by,
     write_whole,
 )
@@ -165,9 +165,13 @@ def test_a_reference_stands_beside_its_statements(pendulum, tmp_path):
 
 def test_what_xml_cannot_hold_is_marked():
     """JUnit's XML is read by every parser, whatever a name holds."""
-    text = junit.as_junit(
+    text = pipeline.as_junit(
         "verify",
-        [junit.Report("a\x00b.fmu", cases=[junit.Case("\x1b[31m", "\x07", failure="\ufffe")])],
+        [
+            pipeline.Report(
+                "a\x00b.fmu", cases=[pipeline.Case("\x1b[31m", "\x07", failure="\ufffe")]
+            )
+        ],
     )
     assert "\ufffd" in next(ElementTree.fromstring(text).iter("testcase")).get("name", "")
 

@@ -235,7 +235,7 @@ def test_one_door_writes_files() -> None:
     )
     found = {p.relative_to(ROOT).as_posix() for p in MODULES if writes.search(p.read_text("utf-8"))}
     beside = {  # what they hand to write_whole, or to a figure's picture in memory
-        *("files.py", "verification/figure.py", "studio/film.py", "studio/live/view.py"),
+        *("files.py", "verification/plot.py", "studio/film.py", "studio/live/view.py"),
         *("studio/report/report.py", "studio/sweep/results.py", "studio/sweep/sweep.py"),
     }
     temporary = {

@@ -30,8 +30,8 @@ from lagfmu import (
 from lagfmu.errors import BuildError, ModelError
 from lagfmu.testing import (
     Moving,
-    as_bytes,
     direction,
+    picture_bytes,
     picture_of,
     prepare,
     read_picture,
@@ -162,7 +162,7 @@ def test_a_picture_may_show_what_the_fmu_reports() -> None:
     picture = picture_of(prepare(pendulum(picture=shapes), Scene("P")))
     assert picture is not None
     assert picture["shapes"][0]["range"] == [-1.0, "energy.total"]
-    assert read_picture(as_bytes(picture)) == picture
+    assert read_picture(picture_bytes(picture)) == picture
 
 
 @pytest.mark.parametrize(
@@ -287,7 +287,7 @@ def test_a_slack_string_hangs(tmp_path: Path, opened: Opened) -> None:
     assert drops[1] < 1
     picture = picture_of(prepared)
     assert picture is not None
-    assert read_picture(as_bytes(picture)) == picture
+    assert read_picture(picture_bytes(picture)) == picture
     (string, _) = (
         Moving(s, {"x": 0.3, "y": -0.5, "L": 1.0}.__getitem__, 1) for s in picture["shapes"]
     )
@@ -307,12 +307,14 @@ def test_a_table_is_drawn_as_it_is(ends: str) -> None:
     """A road in a picture has the table's height between, at and beyond its points, also read from an FMU."""
     road = Spline("road", [0, 1, 2.5, 4], [0, 0.1, -0.2, 0], "m", "m", ends=ends)
     line = {"kind": "disk", "center": [pack(road(2 * sp.Symbol("s"))), 0.0]}
-    found = read_picture(as_bytes({"dimensions": 2, "shapes": [line]}))["shapes"][0]["center"][0]
+    found = read_picture(picture_bytes({"dimensions": 2, "shapes": [line]}))["shapes"][0]["center"][
+        0
+    ]
     places = np.array([-3.0, 0.0, 0.4, 0.5, 1.1, 1.25, 2.0, 5.0])
     heights = values(found, lambda name: places)
     assert heights == pytest.approx([road.table(2 * p) for p in places], abs=1e-15)
     wrong = {"kind": "disk", "center": [["spline", 0.0, 0.0, 1.0, 2.0], 0.0]}
-    text = as_bytes({"dimensions": 2, "shapes": [wrong]})
+    text = picture_bytes({"dimensions": 2, "shapes": [wrong]})
     with pytest.raises(BuildError, match="five a row"):
         read_picture(text)
 

@@ -22,8 +22,8 @@ from lagfmu.bodies import (
     Torsion,
     mechanism,
 )
-from lagfmu.testing import as_bytes as written
 from lagfmu.testing import icon, picture_of, prepare, read_picture
+from lagfmu.testing import picture_bytes as written
 
 ground = Ground()
 

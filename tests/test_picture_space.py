@@ -25,7 +25,7 @@ from lagfmu.bodies import (
 )
 from lagfmu.errors import BuildError, LagfmuWarning, ModelError
 from lagfmu.testing import (
-    as_bytes,
+    picture_bytes,
     picture_of,
     playable,
     prepare,
@@ -105,7 +105,7 @@ def drawn(model: Any) -> list[dict[str, Any]]:
     picture = picture_of(prepare(model, Scene(model.name)))
     assert picture is not None
     assert picture["dimensions"] == 3
-    assert read_picture(as_bytes(picture)) == picture
+    assert read_picture(picture_bytes(picture)) == picture
     return list(picture["shapes"])
 
 
@@ -302,4 +302,4 @@ def test_a_urdf_file_says_how_its_links_look(tmp_path: Path) -> None:
 def test_a_forged_solid_is_refused(shape: dict[str, Any]) -> None:
     """Of a kind, with axes, of an element that there is."""
     with pytest.raises(BuildError, match="picture"):
-        read_picture(as_bytes({"dimensions": 3, "shapes": [shape]}))
+        read_picture(picture_bytes({"dimensions": 3, "shapes": [shape]}))

@@ -17,7 +17,7 @@ from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Model, Page, Scene
 from lagfmu.errors import BuildError, ModelError
-from lagfmu.testing import IN_FMU, Prepared, prepare, preset_of, read_preset, told_by
+from lagfmu.testing import PRESET, Prepared, prepare, preset_of, read_preset, told_by
 
 SHOWN = """() => ({
     sliders: [...document.querySelectorAll("#dials details[open] input[data-name]")]
@@ -58,7 +58,7 @@ def test_the_page_of_a_model_travels_in_its_fmu(
     assert made["curves"][0] == "lambda.ride"
     assert told_by(native_fmu("Belt")).preset == made
     with zipfile.ZipFile(native_fmu("Belt")) as archive:
-        assert IN_FMU in archive.namelist()
+        assert PRESET in archive.namelist()
 
 
 def test_a_scene_leaves_out_what_its_fmu_does_not_have() -> None:

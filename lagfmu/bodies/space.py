@@ -122,6 +122,6 @@ class SpaceMotion(Motion):
 
 
 def _matrix(e: Sequence[Any]) -> Rotation:
-    """R of a quaternion of norm 1, its elements closed: R' = R [w x] is short (mechanics/attitudes.py)."""
+    """R of a quaternion of norm 1, its elements closed: R' = R [w x] is short (mechanics/kinematics.py)."""
     R = rotation_matrix(e)
     return tuple(tuple(R[i, j] for j in range(3)) for i in range(3))  # type: ignore[return-value]

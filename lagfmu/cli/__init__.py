@@ -13,7 +13,7 @@ import sys
 from typing import Any, NoReturn
 
 from ..fmu.archive import tool
-from ..verification.exit_codes import INTERRUPTED, TERMINATED
+from ..verification.pipeline import INTERRUPTED, TERMINATED
 
 
 def main() -> None:

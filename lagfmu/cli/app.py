@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from ..fmu.archive import tool
-from ..verification.exit_codes import EXIT_CODES
+from ..verification.pipeline import EXIT_CODES
 from .commands.linearize import linearize
 from .commands.models import build, new, page, show
 from .commands.runs import reference, report, simulate, verify

@@ -25,7 +25,7 @@ from ..errors import UserInterruptError
 from ..files import write_whole
 from ..page.table import new_table, print_whole
 from ..verification.check import Verification
-from ..verification.junit import Report, as_json, as_junit, exit_code
+from ..verification.pipeline import Report, as_json, as_junit, exit_code
 from .terminal import console, errors, say, say_error
 
 FIRST, QUIET = 2.0, 10.0  # [s] until the first line, and between lines, without a terminal

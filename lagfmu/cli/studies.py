@@ -49,7 +49,7 @@ from ..studio.tradeoff.measure import (
 from ..studio.tradeoff.measure import (
     table as tabled,
 )
-from ..verification.junit import Report, refused
+from ..verification.pipeline import Report, refused
 from .progress import progress
 from .terminal import say, say_wrote
 

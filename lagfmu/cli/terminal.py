@@ -17,7 +17,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from ..errors import LagfmuError, TemporaryFolderError, UserInterruptError
-from ..verification.exit_codes import code_of
+from ..verification.pipeline import code_of
 
 console = Console(emoji=False)  # "0.2:x:3" is what the user wrote
 errors = Console(stderr=True, emoji=False)

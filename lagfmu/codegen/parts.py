@@ -17,14 +17,26 @@ from typing import Any
 import sympy as sp
 
 from ..mechanics.equations import EquationsOfMotion, formulas_of
-from ..mechanics.form import Form
-from ..mechanics.formulations.minimal import Reduction
+from ..mechanics.formulations import Form, Reduction
 from ..mechanics.jumps import NONE, Jumps
 from ..model.differential import Differential
 from ..model.elements import TIME, Expr
 from ..model.model import Constraint, Contact, Nonholonomic
 from ..model.units import ONE, SECOND, Unit
+from ..names import VALUE, read
 from ..numeric.system import CONTACT, HOLONOMIC, NONHOLONOMIC, Friction, Row
+
+
+def identifier(symbol: Any) -> str:
+    """A word for a symbol, which may be taken."""
+    text = str(symbol)
+    if text.startswith("switch("):  # jumps.py
+        return f"switch_{text[len('switch(') : -1]}"
+    of = read(text)
+    if of.quantity == VALUE and of.order:
+        text = f"der{of.order if of.order > 1 else ''}_{of.coordinate}"
+    return text.replace(".", "_")
+
 
 Arguments = Mapping[str, Sequence[Expr]]
 EMBED = "q = phi(s, t) and v = J sdot + dphi/dt."
@@ -48,7 +60,7 @@ class Function:
     results: Mapping[str, Sequence[Value]]
 
 
-def values(expressions: Sequence[Expr], places: Sequence[Any]) -> list[Value]:
+def _values(expressions: Sequence[Expr], places: Sequence[Any]) -> list[Value]:
     """Each expression with its place."""
     return [Value(sp.sympify(e), str(x)) for e, x in zip(expressions, places, strict=True)]
 
@@ -244,7 +256,7 @@ class Parts:
             "f": (_or_zero(eom.f), rows),
             "energy": (_or_zero(energy.values()), list(energy)),
         }
-        return {label: values(*pair) for label, pair in listed.items()}
+        return {label: _values(*pair) for label, pair in listed.items()}
 
     @cached_property
     def functions(self) -> list[Function]:
@@ -277,30 +289,30 @@ class Parts:
             text = "The change of all of these along the direction (dt, dq, dv, du, dp)."
             found.append(self._tangent("tangent", text, state, groups))
         if eom.lookups:
-            places = values([x for _, x in eom.lookups], [s.name for s, _ in eom.lookups])
+            places = _values([x for _, x in eom.lookups], [s.name for s, _ in eom.lookups])
             found.append(
                 Function("lookups", "Where tables are looked up.", state, {"places": places})
             )
         if self.formulas:
             text = "Start values that are expressions of parameters."
             names = [str(s) for s in (*eom.q, *eom.v)]
-            w = values([*self.formulas.values()], [names[j] for j in self.formulas])
+            w = _values([*self.formulas.values()], [names[j] for j in self.formulas])
             found.append(Function("starts", text, {"p": eom.p}, {"w": w}))
         if any(x.expression != 0 for x in groups["f"]) and not eom.bare:
             text = "The largest magnitude among the terms of each f: of what f is rounding."
-            terms = values(
-                [magnitude(x.expression) for x in groups["f"]], [x.place for x in groups["f"]]
+            terms = _values(
+                [_magnitude(x.expression) for x in groups["f"]], [x.place for x in groups["f"]]
             )
             found.append(Function("terms", text, still, {"term": terms}))
         if eom.sides and not eom.bare:
             text = "Positive where joints are not turned over: products of axes vanish at half a turn too."
             names = [self.constraints[k].name for k in eom.sides]
             found.append(
-                Function("sides", text, still, {"side": values([*eom.sides.values()], names)})
+                Function("sides", text, still, {"side": _values([*eom.sides.values()], names)})
             )
         if self.jumps.surfaces:
             text = "h of each jump of the forces: where it passes 0, or a whole number."
-            h = values([s.h for s in self.jumps.surfaces], eom.switch_states)
+            h = _values([s.h for s in self.jumps.surfaces], eom.switch_states)
             found.append(Function("surfaces", text, still, {"h": h}))
         if eom.outputs and not self.prefix:
             found += self._of_outputs()
@@ -312,15 +324,15 @@ class Parts:
         still = {a: s for a, s in self.state.items() if a != "v"}
         places = [f"{eom.q[j]}, {eom.v[i]}" for j, i in self.rates]
         results = {
-            "rates": values([moving.B[ji] for ji in self.rates], places),
-            "drift": values(moving.b, eom.q),
+            "rates": _values([moving.B[ji] for ji in self.rates], places),
+            "drift": _values(moving.b, eom.q),
         }
         yield Function("kinematics", "Rates B and drift b of  q' = B v + b.", still, results)
         if self.tangents:
             text = "Their change along the direction (dt, dq, du, dp)."
             yield self._tangent("kinematics_tangent", text, still, results)
         if eom.unwrapped:
-            angles = values([*eom.unwrapped.values()], [eom.q[j] for j in eom.unwrapped])
+            angles = _values([*eom.unwrapped.values()], [eom.q[j] for j in eom.unwrapped])
             text, told = "What angles equal modulo 2 pi.", {"angle": angles}
             yield Function("unwrapped_angles", text, still, told)
             if self.tangents:
@@ -336,7 +348,7 @@ class Parts:
                 for c in self.constraints
             ]
             text = "Newton's coefficient of restitution of each row; 0 for one that is no contact."
-            results = {"e": values(e, [c.name for c in self.constraints])}
+            results = {"e": _values(e, [c.name for c in self.constraints])}
             yield Function("restitution", text, {"p": eom.p}, results)
         if laws:
             mu = {f"{w} of {a.name}": getattr(a, w) for a in laws for w in ("static", "kinetic")}
@@ -347,9 +359,9 @@ class Parts:
                 "the normal forces."
             )
             results = {
-                "coefficients": values([*mu.values()], [*mu]),
-                "load": values([part.load for _, part in parts], [name for name, _ in parts]),
-                "normal": values([c for _, c in normal], [place for place, _ in normal]),
+                "coefficients": _values([*mu.values()], [*mu]),
+                "load": _values([part.load for _, part in parts], [name for name, _ in parts]),
+                "normal": _values([c for _, c in normal], [place for place, _ in normal]),
             }
             yield Function("coulomb", text, self.state, results)
             if self.tangents:
@@ -361,8 +373,8 @@ class Parts:
         outputs = self.eom.outputs
         places = [f"{o.name} [{o.unit}]" for o in outputs]
         results = {
-            "w": values([o.expression for o in outputs], places),
-            "other": values(_or_zero(o.otherwise for o in outputs), places),
+            "w": _values([o.expression for o in outputs], places),
+            "other": _values(_or_zero(o.otherwise for o in outputs), places),
         }
         text = "Outputs of the model's own, and their values where these are not finite."
         arguments = {**self.state, **self.solved}
@@ -378,7 +390,7 @@ class Parts:
             return []
         state = dict(zip(("t", "s", "sdot", "u", "p"), self.state.values(), strict=True))
         phi, vel = self.reduction.phi, self.reduction.vel
-        results = {"q": values(phi, self.full.q), "v": values(vel, self.full.v)}
+        results = {"q": _values(phi, self.full.q), "v": _values(vel, self.full.v)}
         found = [Function("embed", EMBED, state, results)]
         if self.tangents:
             text = "The change of q and v along the direction (dt, ds, dsdot, du, dp)."
@@ -406,15 +418,15 @@ class Largest(sp.Function):  # type: ignore[misc]
     """The largest of its arguments; unlike sp.Max it compares none of them, which takes SymPy seconds."""
 
 
-def magnitude(e: Expr) -> Expr:
+def _magnitude(e: Expr) -> Expr:
     """The largest magnitude among the terms of which e is made, those of its factors with them; a sine
     or cosine stands beside 1."""
     if isinstance(e, sp.Add):
-        return _largest([magnitude(a) for a in e.args])
+        return _largest([_magnitude(a) for a in e.args])
     if isinstance(e, sp.Mul):
-        return sp.Mul(*map(magnitude, e.args))
+        return sp.Mul(*map(_magnitude, e.args))
     if isinstance(e, sp.Pow) and e.exp.is_positive and e.exp.is_number:
-        return sp.Pow(magnitude(e.base), e.exp)
+        return sp.Pow(_magnitude(e.base), e.exp)
     if isinstance(e, (sp.sin, sp.cos)):
         return sp.S.One
     return sp.Abs(e)

@@ -8,7 +8,7 @@ from typing import Any
 
 from fmpy.fmi1 import FMICallException
 
-from ..interface.rules import rules_of
+from ..interface.variables import rules_of
 from ..prepare.prepare import Prepared
 from .binary import Hear
 from .python import offered, slave_of

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import LagfmuWarning, SettingError
-from ..interface.rules import problems_of
+from ..interface.variables import problems_of
 from ..model.rule import Rule, missing
 from ..names import rate_of
 from .read import Trajectory

@@ -6,11 +6,14 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 
-from ..codegen.c.equations import model_source
-from ..codegen.c.interface import interface_source
-from ..codegen.c.optional import held, needs_tangents, optional_source
-from ..codegen.c.tables import entanglements
-from ..codegen.c.variables import variables_source
+from ..codegen.c.equations import entanglements, model_source
+from ..codegen.c.interface import (
+    held,
+    interface_source,
+    needs_tangents,
+    optional_source,
+    variables_source,
+)
 from ..errors import BuildError
 from ..methods import SEPARABLE
 from ..prepare.prepare import Prepared

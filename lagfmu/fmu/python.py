@@ -14,7 +14,7 @@ import pythonfmu
 from .. import names
 from ..errors import BuildError
 from ..interface.variables import Variable, VariableTable
-from ..mechanics.joint_coordinates import start_names
+from ..mechanics.kinematics import start_names
 from ..methods import IN_PYTHON, NUMBERS
 from ..numeric.closed import OPERATIONS
 from ..prepare.prepare import Prepared

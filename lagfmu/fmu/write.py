@@ -18,14 +18,13 @@ import numpy as np
 from .. import names
 from ..errors import BuildError, DerivationError, ModelError, RequestError
 from ..files import write_whole
-from ..interface.further import with_further
+from ..interface.table import with_further
 from ..model.closed_form import ClosedForm, Conserved
 from ..model.file import fmu_at, in_scene
 from ..model.model import Contact, Model, Peak
 from ..model.scene import Scene
 from ..model.selection import select
 from ..page import picture as pictures
-from ..page import preset as presets
 from ..page.documentation import page, with_figures
 from ..prepare.consistency import values_at_start
 from ..prepare.prepare import Prepared, prepare
@@ -97,9 +96,9 @@ def write(
     if live:
         extra[LIVE] = live.encode()
     if (picture := pictures.picture_of(prepared)) is not None:
-        extra[pictures.IN_FMU] = pictures.as_bytes(picture)
-    if (preset := presets.preset_of(prepared)) is not None:
-        extra[presets.IN_FMU] = presets.as_bytes(preset)
+        extra[pictures.PICTURE] = pictures.picture_bytes(picture)
+    if (preset := pictures.preset_of(prepared)) is not None:
+        extra[pictures.PRESET] = pictures.preset_bytes(preset)
     if target == NATIVE:
         content = native.build(prepared, extra, platforms, sources, face)
     else:

@@ -9,9 +9,8 @@ from functools import cached_property
 import sympy as sp
 
 from .. import names
-from ..mechanics.coupling import coupled
 from ..mechanics.equations import EquationsOfMotion
-from ..mechanics.form import Form
+from ..mechanics.formulations import Form, coupled
 from ..model.elements import TIME, Expr
 
 Names = frozenset[str]

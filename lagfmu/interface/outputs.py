@@ -14,7 +14,7 @@ import sympy as sp
 
 from .. import names
 from ..mechanics.equations import symbols_of
-from ..mechanics.joint_coordinates import start_names
+from ..mechanics.kinematics import start_names
 from ..model.dimensions import dimension_of
 from ..model.elements import Constraint, Expr
 from ..model.model import Contact, Nonholonomic, name_of

@@ -1,5 +1,11 @@
 """The FMU's variables, one by one and as a table.  Both targets and the documentation share it; the
 table itself is made in table.py.
+
+What the variables of a table may be set to, by one kind of rule (model/rule.py).
+
+Python callers ask `problems_of`.  The page gets MESSAGES as data, and the columns of each variable
+(studio/live/page.py).  The FMU itself checks what it is given by the same columns of the variable table:
+runtime/fmi/experiment.c, and by the same kind of rule fmu/slave/instance.py, the python target.
 """
 
 from __future__ import annotations
@@ -10,7 +16,8 @@ from functools import cached_property
 from typing import Any
 
 from .. import names
-from ..methods import described
+from ..methods import NUMBERS, described
+from ..model.rule import Rule, missing
 from ..model.units import ONE, DisplayUnit, Unit
 from ..names import Subject
 
@@ -24,7 +31,7 @@ class Variable:
 
     `of` says what it is of, and so its name.  `kind` is Real, Integer, Boolean or Enumeration (its
     `items` are methods, `start` one by name); `role` says what may set it: parameter, start, input,
-    solver, output (nothing), or interface (further.py).  `depends` are the inputs and states that it is
+    solver, output (nothing), or interface (`with_further`).  `depends` are the inputs and states that it is
     computed from at a communication point, `depends_initially` the inputs and exact start values at the
     start; with them `time`, where it stands in the equations.  `members`: of an array, what is in it.
     `positive`: zero, though not below the minimum, makes no sense.  `given`: of a start value, the model's
@@ -181,3 +188,42 @@ class VariableTable:
     def outputs(self) -> tuple[Variable, ...]:
         """The variables of causality output."""
         return tuple(v for v in self.variables if v.causality == "output")
+
+
+CALCULATED = ("output", "estimate", "interface")  # roles of what nobody sets
+
+
+def rules_of(table: VariableTable) -> dict[str, Rule]:
+    """Of a variable table, by name."""
+    return {
+        v.name: Rule(
+            v.name,
+            v.kind,
+            v.role not in CALCULATED,
+            v.minimum,
+            v.maximum,
+            v.positive,
+            {m: NUMBERS[m] for m in v.items},
+            v.start if isinstance(v.start, float) else None,
+            v.description.endswith(names.FOLLOWS),
+        )
+        for v in table.variables
+    }
+
+
+def problems_of(known: Mapping[str, Rule], values: Mapping[str, Any]) -> list[str]:
+    """All that is wrong with values by name: variables that there are not, or that nobody sets; numbers."""
+    found = []
+    for name, value in values.items():
+        if text := unsettable(known, name) or known[name].problem(value):
+            found.append(text)
+    return found
+
+
+def unsettable(known: Mapping[str, Rule], name: str) -> str:
+    """Why nobody sets a variable of this name; empty if it can be set."""
+    if name in known and known[name].settable:
+        return ""
+    settable = [n for n, rule in known.items() if rule.settable]
+    settable.sort(key=lambda n: names.read(n).head == names.SOLVER)  # what is physics stands first
+    return missing(name, settable, "cannot be set")

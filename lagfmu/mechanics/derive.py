@@ -21,14 +21,106 @@ import sympy as sp
 
 from ..errors import ModelError
 from ..model.differential import Differential
-from ..model.elements import TIME, Expr, Nonholonomic, Tie
+from ..model.elements import TIME, Expr, Nonholonomic, Tie, name_of
 from ..model.model import Constraint, Model
-from .attitudes import attitudes
-from .energies import energies
-from .equations import EquationsOfMotion, changed
-from .friction_law import friction_law
-from .kinematics import Kinematics
-from .plain_symbols import plain_inputs, plain_symbols
+from ..names import derivative
+from .equations import EquationsOfMotion, changed, friction_law
+from .kinematics import Kinematics, attitudes
+
+
+def _plain_symbols(model: Model) -> dict[Expr, Expr]:
+    """dynamicsymbols and their derivatives -> plain symbols named as in the FMU."""
+    table = {}
+    extra = model.embedding.coordinates if model.embedding else {}
+    for s in (*model.coordinates, *extra, *(i.symbol for i in model.inputs)):
+        name = name_of(s)
+        if s.is_Symbol:
+            continue  # an input that was written as a plain symbol
+        table[s] = sp.Symbol(name, real=True)
+        for k in (1, 2):
+            table[s.diff(TIME, k)] = sp.Symbol(derivative(name, k), real=True)
+    return table | _own_speeds(model, table)
+
+
+def _own_speeds(model: Model, table: Mapping[Expr, Expr]) -> dict[Expr, Expr]:
+    """Speeds of the model's own, and the derivatives of the coordinates that move by them."""
+    found = {}
+    for w in model.speeds:
+        found[w] = sp.Symbol(name_of(w), real=True)
+        found[w.diff(TIME)] = sp.Symbol(derivative(name_of(w)), real=True)
+    rates = {s.diff(TIME): sp.sympify(rate) for s, rate in model.kinematics.items()}
+    whole = {**table, **found}
+    found |= {s: rate.xreplace(whole) for s, rate in rates.items()}
+    expressions = [sp.sympify(o.expression) for o in model.outputs]
+    read = set().union(*(e.atoms(sp.Derivative) for e in expressions)) if expressions else set()
+    for s, rate in rates.items():
+        if s.diff(TIME) in read:
+            found[s.diff(TIME)] = rate.diff(TIME).xreplace(rates).xreplace(whole)
+    return found
+
+
+def _plain_inputs(
+    model: Model, table: dict[Expr, Expr]
+) -> tuple[tuple[Expr, ...], dict[Expr, Expr]]:
+    """The plain input symbols, and the rate of each that is differentiated."""
+    u: list[Expr] = []
+    rates: dict[Expr, Expr] = {}
+    for i in model.inputs:
+        u.append(table.get(i.symbol, i.symbol))
+        if i in model.prescribed:
+            first, second = table[i.symbol.diff(TIME)], table[i.symbol.diff(TIME, 2)]
+            rates |= {u[-1]: first, first: second}
+            u += [first, second]
+            if i.rates == "estimated":
+                u.append(sp.Symbol(derivative(name_of(i.symbol), 3), real=True))
+    return tuple(u), rates
+
+
+def _energies(
+    model: Model,
+    energy: Expr,
+    M: dict[tuple[int, int], Expr],
+    v: tuple[Expr, ...],
+    table: dict[Expr, Expr],
+) -> tuple[Expr, Expr | None]:
+    """v^T M v / 2, and minus the part of L without velocities (or the forces' potential)."""
+    kinetic = sp.Add(*(m * v[i] * v[j] / 2 for (i, j), m in sorted(M.items())))
+    standing = -energy.xreplace(dict.fromkeys(v, sp.S.Zero))
+    if model.lagrangian is not None:
+        return kinetic, standing
+    return kinetic, _potential(model, standing, table)
+
+
+def _potential(model: Model, standing: Expr, table: dict[Expr, Expr]) -> Expr | None:
+    """V of the forces that depend on q alone, where they are a gradient of polynomials and sines.
+
+    Each force is split into the terms that hold coordinates and parameters only, and the rest.
+    None if the first have a curl, or act on speeds: then there is no potential energy to report.
+    """
+    if model.forces.keys() & model.speeds.keys():
+        return None
+    q = tuple(table[c] for c in model.coordinates)
+    allowed = set(q) | {p.symbol for p in model.parameters}
+    forces = []
+    for coordinate in model.coordinates:
+        force = sp.expand(sp.sympify(model.forces.get(coordinate, 0)).xreplace(table))
+        forces.append(sp.Add(*(a for a in sp.Add.make_args(force) if a.free_symbols <= allowed)))
+    if any(
+        sp.simplify(forces[i].diff(q[j]) - forces[j].diff(q[i])) != 0
+        for i in range(len(q))
+        for j in range(i)
+    ):
+        return None
+    V = sp.S.Zero
+    for force, s in zip(forces, q, strict=True):
+        rest = sp.expand(force + V.diff(s))
+        integral = sp.integrate(rest, s)
+        if integral.has(sp.Integral):
+            return None
+        V -= integral
+    if any(sp.simplify(f + V.diff(s)) != 0 for f, s in zip(forces, q, strict=True)):
+        return None
+    return V + standing
 
 
 def derive(model: Model) -> EquationsOfMotion:
@@ -37,11 +129,11 @@ def derive(model: Model) -> EquationsOfMotion:
     Raises ModelError if the energy is not quadratic in the velocities, or a nonholonomic constraint
     is not affine in them.
     """
-    table = plain_symbols(model)
+    table = _plain_symbols(model)
     q = tuple(table[c] for c in model.coordinates)
     qdot = tuple(table[c.diff(TIME)] for c in model.coordinates)
     v = tuple(table[s] for s in model.states[len(q) :])
-    u, rates = plain_inputs(model, table)
+    u, rates = _plain_inputs(model, table)
     angles = {table[s] for s in model.unwrapped}
     places = frozenset(j for j, s in enumerate(q) if s in angles)
     closed = attitudes(model, table)
@@ -90,7 +182,7 @@ def derive(model: Model) -> EquationsOfMotion:
 
     if problems:
         raise ModelError(model.name, problems)
-    kinetic, potential = energies(model, energy, M, v, table)
+    kinetic, potential = _energies(model, energy, M, v, table)
     made = EquationsOfMotion(
         model=model,
         q=q,

@@ -1,26 +1,153 @@
-"""The equations of motion of a model: M, F, G, nu, gamma with all that stands beside them."""
+"""The equations of motion of a model: M, F, G, nu, gamma with all that stands beside them.
+
+Multipliers as formulas, where the system is small:
+
+    (G M^-1 G^T) lambda = gamma - G M^-1 F          (Ascher & Petzold 1998, sect. 10.2)
+
+with all constraints acting, contacts closed.  In a large system the formula would be no help, and its
+derivation no end.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
 import sympy as sp
 
+from ..errors import DerivationError
 from ..model.display import Displayed
-from ..model.elements import TIME, Expr, Tie, name_of
+from ..model.elements import TIME, Expr, Friction, Tie, name_of
 from ..model.model import Constraint, Model, Output, Parameter
-from ..model.reactions import force_of_constraint, multiplier
+from ..model.norms import norm, norms_of
+from ..model.reactions import force_of_constraint, multiplier, reactions_in
 from ..model.speeds import quaternions
 from ..model.spline import Spline, SplineBase
 from ..model.units import Unit
 from ..names import derivative, rate_of, read
-from .formulations.multipliers import multipliers
-from .friction_law import FrictionLaw
-from .joint_coordinates import JointCoordinate, joint_coordinates
-from .kinematics import Kinematics
+from .kinematics import JointCoordinate, Kinematics, joint_coordinates
+
+
+@dataclass(frozen=True)
+class NormalPart:
+    """load + sum_k c[k] lambda_k, with names of constraints: a normal force, or one of its components."""
+
+    load: Expr
+    c: Mapping[str, Expr]
+
+    @property
+    def force(self) -> Expr:
+        """In the multipliers' symbols."""
+        return sp.Add(self.load, *(c * multiplier(k) for k, c in self.c.items()))
+
+
+@dataclass(frozen=True)
+class FrictionLaw:
+    """|lambda| of the rows `of` is at most static * N, and kinetic * N while they slip.
+
+    N is the sum of `norms`, each of one component or several; in plain symbols.
+    """
+
+    name: str
+    of: tuple[str, ...]
+    norms: tuple[tuple[NormalPart, ...], ...]
+    static: Expr
+    kinetic: Expr
+    description: str = ""
+
+    @property
+    def parts(self) -> tuple[NormalPart, ...]:
+        """The components of all norms."""
+        return tuple(part for parts in self.norms for part in parts)
+
+    @property
+    def normal(self) -> Expr:
+        """The normal force; where it is of one component, that with its sign."""
+        if len(self.parts) == 1:
+            return self.parts[0].force
+        return sp.Add(*(norm(*(part.force for part in parts)) for parts in self.norms))
+
+    @property
+    def normal_rows(self) -> tuple[str, ...]:
+        """The constraints whose multipliers make up the normal force, as often as they stand in it."""
+        return tuple(name for part in self.parts for name in part.c)
+
+    @property
+    def expressions(self) -> tuple[Expr, ...]:
+        """All of its expressions."""
+        of_parts = (e for part in self.parts for e in (part.load, *part.c.values()))
+        return (self.static, self.kinetic, *of_parts)
+
+    def mapped(self, change: Callable[[Expr], Expr]) -> FrictionLaw:
+        """The same with `change` done to every expression."""
+
+        def moved(part: NormalPart) -> NormalPart:
+            return NormalPart(change(part.load), {k: change(c) for k, c in part.c.items()})
+
+        return replace(
+            self,
+            norms=tuple(tuple(map(moved, parts)) for parts in self.norms),
+            static=change(self.static),
+            kinetic=change(self.kinetic),
+        )
+
+
+def friction_law(f: Friction, table: dict[Expr, Expr]) -> FrictionLaw:
+    """A friction in plain symbols, its normal force by components."""
+
+    def part(component: Expr) -> NormalPart:
+        component = sp.sympify(component).xreplace(table)
+        symbols = reactions_in(component)
+        return NormalPart(
+            component.xreplace(dict.fromkeys(symbols, sp.S.Zero)),
+            {read(str(s)).constraint: component.diff(s) for s in symbols},
+        )
+
+    norms = norms_of(f.normal)
+    assert norms is not None  # checked with the model
+    return FrictionLaw(
+        name=f.name,
+        of=tuple(f.of),
+        norms=tuple(tuple(map(part, components)) for components in norms),
+        static=sp.sympify(f.static).xreplace(table),
+        kinetic=sp.sympify(f.sliding).xreplace(table),
+        description=f.description,
+    )
+
+
+MOST, OPERATIONS = 6, 400  # coordinates and constraints together; operations of M, G, F and gamma
+
+
+def _multipliers(name: str, M: Any, G: Any, F: Sequence[Expr], gamma: Sequence[Expr]) -> list[Expr]:
+    """lambda (m) of  M vdot = F + G^T lambda,  G vdot = gamma  of the model `name`.
+
+    Raises DerivationError where the system is too large, or M or G M^-1 G^T has no inverse.
+    """
+    m, n = G.shape
+    size = n + m
+    entries = [*M.todok().values(), *G.todok().values(), *F, *gamma]
+    work = int(sum(sp.count_ops(e) for e in entries))
+    if size > MOST or work > OPERATIONS:
+        raise DerivationError(
+            f"{name}: lambda as a formula is for small systems, expected at most {MOST} "
+            f"coordinates and constraints together (here {size}) and {OPERATIONS} operations (here {work}); "
+            "simulate it, or read the equations G vdot = gamma and M vdot = F + G^T lambda"
+        )
+    if not m:
+        return []
+    M, G = sp.Matrix(M), sp.Matrix(G)
+    try:
+        solved = M.LUsolve(G.T.row_join(sp.Matrix(F)))
+        schur = (G * solved[:, :m]).applyfunc(sp.simplify)
+        right = (sp.Matrix(gamma) - G * solved[:, m:]).applyfunc(sp.simplify)
+        return [sp.simplify(e) for e in schur.LUsolve(right)]
+    except (sp.matrices.exceptions.NonInvertibleMatrixError, ValueError, ZeroDivisionError):
+        raise DerivationError(
+            f"{name}: M or G M^-1 G^T has no inverse (a coordinate without mass, or redundant "
+            "constraints): lambda has no formula of its own"
+        ) from None
 
 
 @dataclass(frozen=True)
@@ -74,7 +201,7 @@ class EquationsOfMotion(Displayed):
 
         Raises DerivationError where the system is too large, or M or G M^-1 G^T has no inverse.
         """
-        found = multipliers(self.model.name, self.M, self.G, self.F, self.gamma)
+        found = _multipliers(self.model.name, self.M, self.G, self.F, self.gamma)
         back = {plain: s for s, plain in self.symbols.items() if plain.is_Symbol}
         back |= {TIME: sp.Symbol("t")}
         return {c.name: e.xreplace(back) for c, e in zip(self.constraints, found, strict=True)}

@@ -25,7 +25,7 @@ from sympy.printing.precedence import precedence
 from ..errors import ModelError
 from ..model.elements import TIME, Expr
 from .equations import EquationsOfMotion
-from .form import Form
+from .formulations import Form
 
 SAMPLES = 6  # points of a surface at which a jump is looked for
 TRIALS = 60  # random points from which the surface is sought

@@ -1,7 +1,7 @@
 """What one FMU reports: the full FMU is the scene that asks for everything.
 
 `outputs`, `fixed`, `inputs`, `contacts` and `frictions` name what an importer reads, changes and drives, and
-what may open and slip; prune.py and fold.py remove everything else before code is printed.
+what may open and slip; mechanics/prune.py removes everything else before code is printed.
 """
 
 from __future__ import annotations

@@ -2,26 +2,88 @@
 
 One HTML file that needs nothing else: mathematics as MathML, styles inside.  The same model gives the
 same bytes.
+
+A notebook shows models, equations of motion and classifications likewise.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from functools import cache, singledispatch
+from html import escape
+from importlib.resources import files
+from typing import Any
 
+import jinja2
+import sympy as sp
 from latex2mathml.converter import convert
 from markupsafe import Markup
 
 from .. import names
+from ..interface.table import INTERFACE
 from ..interface.variables import Variable, VariableTable
-from ..model.model import Contact, Holonomic, Nonholonomic
+from ..mechanics.derive import derive
+from ..mechanics.equations import EquationsOfMotion
+from ..mechanics.formulations import Form
+from ..mechanics.integrability.classify import Classification
+from ..model.model import Contact, Holonomic, Model, Nonholonomic
 from ..model.units import Unit, for_reading
 from ..numeric.start_priority import OMITTED
 from ..prepare.prepare import Prepared
-from .groups import heading
 from .savings import savings
-from .template import template
 from .typeset import typeset
+
+
+@cache
+def template(path: str) -> jinja2.Template:
+    """The one at `path` in the package; what it is given is escaped, and what it is not given an error."""
+    environment = jinja2.Environment(
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=jinja2.StrictUndefined,
+        loader=jinja2.FunctionLoader(_text),
+    )
+    return environment.get_template(path)
+
+
+def _text(path: str) -> str:
+    return files("lagfmu").joinpath(path).read_text(encoding="utf-8")
+
+
+SET = {"parameter": "Parameters", "input": "Inputs", "estimate": "Inputs"}  # by role
+CALCULATED = {  # by the kind of what a variable is of
+    names.MULTIPLIER: "Multipliers λ",
+    **dict.fromkeys(names.OF_FRICTION, "Friction"),
+    names.FORCE: "Generalized forces of constraint",
+    names.ENERGY: "Energies",
+    names.RESIDUAL: "Residuals, zero where a constraint acts",
+    names.UNIQUE: "Whether λ is determined",
+    **dict.fromkeys((names.CONTACT, names.DEPARTURE, names.CLOSING), "Contacts"),
+    names.ERROR: "Error bars",
+    names.PEAK: "Extremes so far",
+    names.SOLVER: "Solver",
+}
+
+
+def heading(name: str, role: str, known: Collection[str]) -> str:
+    """Of a variable of that name and role; `known`: the names of all."""
+    of = names.read(name)
+    if role in SET:
+        return SET[role]
+    if role == INTERFACE:
+        return "Of FMI 3.0 alone"
+    if of.quantity == names.FORCE and of.constraint:
+        return "Forces of each constraint"
+    if of.quantity == names.RESIDUAL and names.name(names.CONTACT, of.constraint) in known:
+        return "Gaps of contacts"
+    if of.head in CALCULATED:
+        return CALCULATED[of.head]
+    if of.order:
+        return "Accelerations" if of.order == 2 else "Velocities"
+    return "Coordinates" if role == "start" or names.derivative(name) in known else "Outputs"
+
 
 MEANING = {
     "multipliers": "Lagrange's equations and the constraints, differentiated to accelerations, are "
@@ -134,3 +196,73 @@ def with_figures(text: str, figures: Sequence[tuple[str, ...]], references: str 
     link = '<li><a href="#verification">Verification</a></li>'
     found = template("page/verification.html.j2").render(figures=figures, references=references)
     return text.replace(LINK, link).replace(FIGURES, found.rstrip())
+
+
+@singledispatch
+def html(thing: Any) -> str:
+    """HTML with the mathematics as MathML."""
+    return f"<pre>{escape(repr(thing))}</pre>"
+
+
+@singledispatch
+def latex(thing: Any) -> str:
+    """One display in LaTeX."""
+    return f"$${sp.latex(thing)}$$"
+
+
+@html.register
+def _(form: Form) -> str:
+    parts = [f"<h4>{escape(form.equations.model.name)}</h4>"]
+    for section in typeset(form):
+        if section.equations:
+            rows = "".join(
+                f"<tr><td>{escape(e.label)}</td><td style='text-align:left'>{mathml(e.latex)}</td></tr>"
+                for e in section.equations
+            )
+            parts.append(f"<p><b>{escape(section.title)}</b></p><table>{rows}</table>")
+    return "".join(parts)
+
+
+@html.register
+def _(equations: EquationsOfMotion) -> str:
+    return html(Form(equations))
+
+
+@latex.register
+def _(equations: EquationsOfMotion) -> str:
+    lines = [e.latex for section in typeset(Form(equations)) for e in section.equations]
+    return "$$\\begin{gathered}" + " \\\\ ".join(lines) + "\\end{gathered}$$"
+
+
+@html.register
+def _(model: Model) -> str:
+    rows = "".join(
+        f"<tr><td>{escape(str(p.symbol))}</td><td>{p.value!r}</td><td>{escape(p.unit)}</td></tr>"
+        for p in model.parameters
+    )
+    described = f"<p>{escape(model.description)}</p>" if model.description else ""
+    head = "<tr><th>parameter</th><th>value</th><th>unit</th></tr>"
+    return f"{html(derive(model))}{described}<table>{head}{rows}</table>"
+
+
+@latex.register
+def _(model: Model) -> str:
+    return latex(derive(model))
+
+
+@html.register
+def _(found: Classification) -> str:
+    integrals = "".join(f"<li>{mathml(sp.latex(i.f))} = const</li>" for i in found.integrals)
+    return (
+        f"<p><b>{escape(str(found.kind))}</b> (rank {found.rank}, holonomic {found.holonomic_rank})</p>"
+        f"<ul>{integrals}</ul><p>{escape(found.certificate)}</p>"
+    )
+
+
+@latex.register
+def _(found: Classification) -> str:
+    lines = [
+        f"\\text{{{found.kind}}}",
+        *(f"{sp.latex(i.f)} = \\mathrm{{const}}" for i in found.integrals),
+    ]
+    return "$$\\begin{gathered}" + " \\\\ ".join(lines) + "\\end{gathered}$$"

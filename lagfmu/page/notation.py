@@ -17,7 +17,7 @@ from sympy.printing.pretty.pretty_symbology import greek_unicode
 from sympy.printing.str import StrPrinter
 
 from ..mechanics.equations import EquationsOfMotion
-from ..mechanics.formulations.minimal import Reduction
+from ..mechanics.formulations import Reduction
 from ..model.elements import TIME, Expr
 from ..model.reactions import multiplier
 from ..model.units import SUPERSCRIPT

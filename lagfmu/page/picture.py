@@ -1,21 +1,32 @@
-"""A model's picture as data: {"dimensions": 2 or 3, "shapes": [{"kind": "rod", "points": [...]}, ...]}.
+"""What travels in an FMU for its live page, as data: nothing of it is ever run.
 
-It travels in the FMU (resources/picture.json); its expressions are those of packed.py.
+A picture (resources/picture.json): {"dimensions": 2 or 3, "shapes": [{"kind": "rod", "points": [...]}, ...]}.
+Its expressions are a number, the name of a variable, or a list [operation, operand, ...]; the page evaluates
+them, and `values` does for films.
+
+What the page shows at first (resources/page.json):
+{"sliders": ["m", ...], "curves": [...], "ranges": {"m": [0.5, 2.0]}}.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+import numpy as np
 import sympy as sp
 
 from ..errors import BuildError, ModelError
 from ..files import foreign, json_of
+from ..interface.table import variable_table
+from ..mechanics.formulations import Form
+from ..model.attitude import Attitude, ClosedFunction
 from ..model.closed_form import in_variables
 from ..model.elements import TIME, Expr
 from ..model.model import Model, Nonholonomic
+from ..model.page import told
 from ..model.picture import (
     PIVOTS,
     Arrow,
@@ -30,8 +41,103 @@ from ..model.picture import (
     points_of,
 )
 from ..model.reactions import multiplier
+from ..model.scene import EVERYTHING
+from ..model.selection import select
+from ..model.spline import SplineBase
+from ..numeric.closed import rotation
+from ..numeric.cubic import Cubic
 from ..prepare.prepare import Prepared
-from .packed import Packed, checked, names_of, pack
+
+Packed = float | str | list[Any]
+FUNCTIONS: Mapping[Any, str] = {
+    **{f: f.__name__ for f in (sp.sin, sp.cos, sp.tan, sp.asin, sp.acos, sp.atan, sp.atan2)},
+    **{f: f.__name__ for f in (sp.sinh, sp.cosh, sp.tanh, sp.exp, sp.log, sp.sign)},
+    **{sp.Abs: "abs", sp.Min: "min", sp.Max: "max", sp.Add: "+", sp.Mul: "*", sp.Pow: "^"},
+}
+
+
+def _spline(x: Any, periodic: float, *rows: float) -> Any:
+    """A table at x: whether it repeats, then a knot and its four coefficients, row by row."""
+    knots, *columns = (rows[k::5] for k in range(5))
+    table = Cubic(knots, list(zip(*columns, strict=True)), bool(periodic))
+    return np.vectorize(table, otypes=[float])(x)
+
+
+OPERATIONS: Mapping[str, Callable[..., Any]] = {
+    "+": lambda *x: sum(x),
+    "*": lambda *x: math.prod(x),
+    "^": np.power,
+    **{name: getattr(np, name) for name in ("sin", "cos", "tan", "sinh", "cosh", "tanh")},
+    **{name: getattr(np, name) for name in ("exp", "log", "sign", "abs")},
+    **{"asin": np.arcsin, "acos": np.arccos, "atan": np.arctan, "atan2": np.arctan2},
+    "spline": _spline,
+    "attitude": lambda i, j, *e: rotation(e)[3 * int(i) + int(j)] / sum(x**2 for x in e),
+    **{"min": lambda *x: np.minimum.reduce(x), "max": lambda *x: np.maximum.reduce(x)},
+}
+DEEPEST = 200  # nested lists that are read
+
+
+def pack(expression: Expr, numbers: Mapping[str, Any] = {}) -> Packed:
+    """An expression of the FMU's variables as data.  Raises ValueError for a function it cannot hold."""
+    if expression.is_Symbol:
+        name = str(expression)
+        return float(numbers[name]) if name in numbers else name
+    if expression.is_number:
+        value = float(expression)
+        if not math.isfinite(value):
+            raise ValueError(f"{expression} is no finite number")
+        return value
+    if isinstance(expression, SplineBase) and expression.order == 0:
+        table = expression.spline.table
+        rows = [
+            float(x) for k, c in zip(table.knots, table.coefficients, strict=True) for x in (k, *c)
+        ]
+        return ["spline", pack(expression.args[0], numbers), float(table.periodic), *rows]
+    if isinstance(expression, Attitude):
+        return ["attitude", *(pack(a, numbers) for a in expression.args)]
+    if isinstance(expression, ClosedFunction):
+        return pack(expression.opened(), numbers)
+    operation = FUNCTIONS.get(expression.func)
+    if operation is None:
+        known = ", ".join(sorted(f for f in FUNCTIONS.values() if f.isalpha()))
+        raise ValueError(
+            f"{expression} cannot be drawn, expected sums, products, powers, tables, {known}"
+        )
+    return [operation, *(pack(a, numbers) for a in expression.args)]
+
+
+def _names_of(packed: Any) -> set[str]:
+    """The variables of expressions, however they are listed."""
+    if isinstance(packed, str):
+        return set() if packed in OPERATIONS else {packed}
+    return set().union(*map(_names_of, packed)) if isinstance(packed, list) else set()
+
+
+def values(packed: Packed, look: Callable[[str], Any]) -> Any:
+    """The value of an expression; `look` gives a variable's value, or an array of them."""
+    if isinstance(packed, str):
+        return look(packed)
+    if isinstance(packed, list):
+        return OPERATIONS[packed[0]](*(values(p, look) for p in packed[1:]))
+    return packed
+
+
+def checked(packed: Any, depth: int = 0) -> Packed:
+    """An expression that was read.  Raises ValueError for what is none."""
+    if depth > DEEPEST:
+        raise ValueError("an expression is nested too deeply")
+    if isinstance(packed, str):
+        return packed
+    if isinstance(packed, list) and packed and packed[0] in OPERATIONS and len(packed) > 1:
+        if packed[0] == "spline" and (len(packed) < 8 or len(packed) % 5 != 3):
+            raise ValueError(f"a table of {len(packed) - 3} numbers, expected five a row")
+        if packed[0] == "attitude" and (len(packed) != 7 or {*packed[1:3]} - {0, 1, 2}):
+            raise ValueError(f"an attitude {packed[1:]}, expected row, column and a quaternion")
+        return [packed[0], *(checked(p, depth + 1) for p in packed[1:])]
+    if isinstance(packed, int | float) and not isinstance(packed, bool) and math.isfinite(packed):
+        return float(packed)
+    raise ValueError(f"{packed!r} is no expression")
+
 
 FIELDS = {  # kind -> names of its points, lists of points, single expressions, and the rest
     "line": ((), ("points",), ("length",), ()),
@@ -48,7 +154,7 @@ FIELDS = {  # kind -> names of its points, lists of points, single expressions, 
 }
 KINDS = {Sphere: "disk", Track: "path"}  # others are called as their class
 OPTIONAL = ("length", "radius", "angle", "axis", "coils", "trace", "strokes")
-IN_FMU = "resources/picture.json"
+PICTURE = "resources/picture.json"
 
 
 def picture_of(prepared: Prepared, forces: bool = True) -> dict[str, Any] | None:
@@ -156,10 +262,10 @@ def names_in(shape: Mapping[str, Any]) -> set[str]:
     """The variables of a shape; what its path runs over is none."""
     points, lists, single, _ = FIELDS[shape["kind"]]
     values = [shape[k] for k in (*points, *lists, *single, "range") if k in shape]
-    return names_of(values) - {shape.get("over")}
+    return _names_of(values) - {shape.get("over")}
 
 
-def as_bytes(picture: Mapping[str, Any]) -> bytes:
+def picture_bytes(picture: Mapping[str, Any]) -> bytes:
     """The picture as it travels in an FMU."""
     return json.dumps(picture, ensure_ascii=False, sort_keys=True, allow_nan=False).encode()
 
@@ -167,7 +273,7 @@ def as_bytes(picture: Mapping[str, Any]) -> bytes:
 def read_picture(text: bytes) -> dict[str, Any]:
     """The picture in an FMU.  Raises BuildError for what is none: an FMU may come from anywhere."""
     with foreign(
-        lambda said: BuildError(f"{IN_FMU} is no picture of lagfmu's ({said}): build the FMU anew")
+        lambda said: BuildError(f"{PICTURE} is no picture of lagfmu's ({said}): build the FMU anew")
     ):
         found = json_of(text)
         shapes = [_checked_shape(s) for s in found["shapes"]]
@@ -209,3 +315,59 @@ def _one_of(value: object, known: tuple[str, ...]) -> str:
     if value not in known:
         raise ValueError(f"{value!r}, expected one of {', '.join(known)}")
     return str(value)
+
+
+Preset = dict[str, Any]
+PRESET = "resources/page.json"
+SETTABLE = ("parameter", "input", "start")  # roles of what a slider may set
+
+
+def preset_of(prepared: Prepared) -> Preset | None:
+    """The model's, of what the FMU in this scene has.  Raises ModelError for names that no FMU of it has."""
+    page = prepared.model.page
+    if page is None:
+        return None
+    tables = [prepared.whole]
+    if not prepared.scene.complete:
+        tables.append(variable_table(Form(prepared.derived), prepared.asked))
+    variables = {v.name: v for table in tables for v in table.variables}
+    settable = [n for n, v in variables.items() if v.role in SETTABLE]
+    readable = [n for n, v in variables.items() if v.causality == "output"]
+    problems: list[str] = []
+    sliders = [n for v in page.sliders for n in select([told(v)], settable, "slider", problems)]
+    curves = [n for v in page.curves for n in select([told(v)], readable, "curve", problems)]
+    select([told(v) for v in page.ranges], settable, "the slider of a range", problems)
+    if problems and tuple(prepared.asked.frictions) == EVERYTHING:  # else it has outputs of others
+        raise ModelError(prepared.model.name, [f"page: {p}" for p in problems])
+    return {
+        "sliders": [n for n in dict.fromkeys(sliders) if n in prepared.table],
+        "curves": [n for n in dict.fromkeys(curves) if n in prepared.table],
+        "ranges": {
+            told(v): [float(low), float(high)]
+            for v, (low, high) in page.ranges.items()
+            if told(v) in prepared.table
+        },
+    }
+
+
+def preset_bytes(preset: Preset) -> bytes:
+    """The preset as it travels in an FMU."""
+    return json.dumps(preset, ensure_ascii=False, sort_keys=True, allow_nan=False).encode()
+
+
+def read_preset(text: bytes) -> Preset:
+    """The preset in an FMU.  Raises BuildError for what is none: an FMU may come from anywhere."""
+    with foreign(
+        lambda said: BuildError(f"{PRESET} is no page of lagfmu's ({said}): build the FMU anew")
+    ):
+        found = json_of(text)
+        ranges = {str(n): _ends(ends) for n, ends in dict(found["ranges"]).items()}
+        lists = {what: [str(n) for n in list(found[what])] for what in ("sliders", "curves")}
+        return {**lists, "ranges": ranges}
+
+
+def _ends(ends: Any) -> list[float]:
+    low, high = map(float, ends)
+    if not (math.isfinite(low) and math.isfinite(high) and low < high):
+        raise ValueError(f"a range {ends!r}")
+    return [low, high]

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from ..codegen.c.elimination import plan
 from ..codegen.c.equations import model_source
-from ..codegen.c.optional import needs_tangents
+from ..codegen.c.interface import needs_tangents
+from ..codegen.c.sparsity import plan
 from ..mechanics.equations import EquationsOfMotion
-from ..mechanics.fold import idle as idle_parameters
+from ..mechanics.prune import idle as idle_parameters
 from ..model.elements import Expr
 from ..model.units import Unit
 from ..prepare.prepare import Prepared, prepare

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
+from dataclasses import dataclass
 
 import sympy as sp
 from rich.cells import cell_len
@@ -22,7 +24,65 @@ from .documentation import as_given, shown
 from .notation import Notation
 from .savings import Savings, savings
 from .typeset import typeset
-from .wrapped import wrapped
+
+# of breaks before operators; between factors or words: 5
+KINDS = {"=≤≥<>≠": 0, "+-−±": 1, "/·∧": 4}
+OPERATORS = "".join(KINDS)
+OPEN, CLOSE = "([{", ")]}"
+LEVEL = 4.0  # kinds of operators a level
+EMPTY = 4.0  # what a line costs that is left empty, ...
+SHORT, LEAST = 8.0, 0.3  # ... and what one costs of which less than this part is used
+
+
+@dataclass(frozen=True)
+class _Word:
+    """`depth`: of the brackets around it; `kind`: of a break before it, the better the smaller."""
+
+    text: str
+    depth: int
+    kind: int
+
+
+def wrapped(text: str, width: int) -> list[str]:
+    """The words of a text, all of them, in lines of at most `width` cells (longer if one word is); those that
+    begin inside of brackets are indented."""
+    words = list(_words(text))
+    lines: list[str] = []
+    while words:
+        indent = "  " * min(words[0].depth, 3) if lines else ""
+        count = _taken(words, width - len(indent))
+        lines.append(indent + _joined(words[:count]))
+        words = words[count:]
+    return lines or [""]
+
+
+def _joined(words: list[_Word]) -> str:
+    return " ".join(word.text for word in words)
+
+
+def _words(text: str) -> Iterator[_Word]:
+    depth, before = 0, " "
+    for word in text.split():
+        kind = next((k for s, k in KINDS.items() if word in s), 5)
+        stays = before in OPERATORS  # with the operator before it
+        yield _Word(word, depth, kind + 8 * stays)
+        depth += sum(word.count(c) for c in OPEN) - sum(word.count(c) for c in CLOSE)
+        before = word
+
+
+def _taken(words: list[_Word], width: int) -> int:
+    """How many words, one at the least, make the best line."""
+    used, found, best = cell_len(words[0].text), 1, float("inf")
+    for count, word in enumerate(words[1:], 1):
+        part = min(used / width, 1.0)
+        cost = LEVEL * word.depth + word.kind + EMPTY * (1 - part) + SHORT * (part < LEAST)
+        if cost <= best:
+            found, best = count, cost
+        used += 1 + cell_len(word.text)
+        if used > width:
+            return found
+    return len(words)
+
 
 INDENT = 6
 
@@ -32,7 +92,7 @@ def show(prepared: Prepared, console: Console, untried: str = "") -> None:
 
     Raises DerivationError if the nonholonomic constraints contradict each other.
     """
-    show_equations(prepared, console)
+    _show_equations(prepared, console)
     show_besides(prepared, console, untried)
 
 
@@ -83,7 +143,7 @@ def show_besides(prepared: Prepared, console: Console, untried: str = "") -> Non
     console.print()
 
 
-def show_equations(prepared: Lowered, console: Console) -> None:
+def _show_equations(prepared: Lowered, console: Console) -> None:
     """Print the name, the formulation and the equations of a model in a scene, whether it starts or not."""
     model, scene = prepared.model, prepared.scene
     head = Text(scene.name, style="bold")
@@ -104,7 +164,7 @@ def show_equations(prepared: Lowered, console: Console) -> None:
 
 def show_what_is_known(known: Lowered, console: Console) -> None:
     """Print what can be said of a model that cannot start."""
-    show_equations(known, console)
+    _show_equations(known, console)
     _given(known, console)
     console.print()
 

@@ -13,9 +13,7 @@ import sympy as sp
 
 from ..mechanics import simplification
 from ..mechanics.equations import EquationsOfMotion
-from ..mechanics.form import Form
-from ..mechanics.formulations.minimal import Reduction
-from ..mechanics.formulations.nullspace import lambda_free, largest_group
+from ..mechanics.formulations import Form, Reduction, lambda_free, largest_group
 from ..model.elements import Expr, name_of
 from ..model.model import Contact, Nonholonomic
 from ..model.reactions import multiplier

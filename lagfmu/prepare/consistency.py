@@ -23,7 +23,7 @@ from ..interface.table import variable_table
 from ..interface.variables import VariableTable
 from ..mechanics import prune
 from ..mechanics.equations import EquationsOfMotion
-from ..mechanics.form import Form
+from ..mechanics.formulations import Form
 from ..model.model import Contact, name_of
 from ..model.units import ONE, for_reading
 from ..names import RESIDUAL, name

@@ -9,13 +9,11 @@ from dataclasses import replace
 from ..codegen.py.equations import compile_system, source
 from ..codegen.py.equations import lower as lowered_form
 from ..errors import LagfmuWarning, RequestError
-from ..interface.sensitivities import named
-from ..interface.table import variable_table
-from ..mechanics import fold, prune
+from ..interface.table import named, variable_table
+from ..mechanics import formulations, prune
 from ..mechanics.derive import derive as derive_equations
 from ..mechanics.equations import EquationsOfMotion
-from ..mechanics.form import Form
-from ..mechanics.formulations import minimal
+from ..mechanics.formulations import Form
 from ..mechanics.jumps import with_jumps
 from ..methods import AUTO, UNLESS_STIFF
 from ..model.elements import Expr
@@ -63,7 +61,7 @@ def narrow(derived: Derived) -> Narrowed:
     """To the scene: contacts that cannot open, what is fixed, the formulation, the outputs by name."""
     scene, problems = derived.asked, list[str]()
     acting = prune.held(derived.derived, scene, problems)
-    fixed = fold.numbers_of(derived.derived, scene, problems)
+    fixed = prune.numbers_of(derived.derived, scene, problems)
     asked = formulated(derived, acting, problems)
     return Narrowed(**vars(derived), **vars(asked), fixed=fixed)
 
@@ -76,21 +74,21 @@ def reduce(narrowed: Narrowed) -> Reduced:
         equations = prune.only(form.equations, *prune.needed(_with_numbers(form, fixed), read))
         reduction = form.reduction
         if reduction is not None and equations is not form.equations:
-            reduction = minimal.reduce(equations)
+            reduction = formulations.reduce(equations)
         own = prune.own(equations, read)
         if own != equations.outputs:
             equations = replace(equations, outputs=own)
         form = replace(form, equations=equations, reduction=reduction)
         coded = prune.read_only(replace(form, equations=prune.silent(form.equations, read)), read)
         asked = named(scene.sensitivities)
-        idle = [p for p in fold.idle(_with_numbers(coded, fixed)) if str(p) not in asked]
-        fixed |= fold.values(idle, narrowed.model)
-        damped = fold.damped(coded.equations, fixed)
+        idle = [p for p in prune.idle(_with_numbers(coded, fixed)) if str(p) not in asked]
+        fixed |= prune.values(idle, narrowed.model)
+        damped = prune.damped(coded.equations, fixed)
         if scene.method == AUTO and scene.methods is None and not damped:
             scene = replace(scene, method=UNLESS_STIFF)
         whole = variable_table(form, scene)
     check_embedding(form)
-    coded = fold.folded_form(coded, fixed)
+    coded = prune.folded_form(coded, fixed)
     numbers = {str(s): n for s, n in coded.equations.numbers.items()}
     made = {"scene": scene, "form": form, "whole": whole, "fixed": fixed}
     return Reduced(**vars(narrowed) | made, coded=coded, numbers=numbers)
@@ -98,7 +96,7 @@ def reduce(narrowed: Narrowed) -> Reduced:
 
 def _with_numbers(form: Form, fixed: Mapping[Expr, Expr]) -> Form:
     """With numbers in the equations, for asking what depends on what."""
-    return replace(form, equations=fold.folded(form.equations, fixed))
+    return replace(form, equations=prune.folded(form.equations, fixed))
 
 
 def lower(reduced: Reduced) -> Lowered:

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..errors import CannotStartError, ModelError
 from ..interface.table import variable_table
-from ..mechanics.form import Form
+from ..mechanics.formulations import Form
 from ..model.model import Model
 from ..names import motion
 from ..numeric.instant import at_start, expanded

@@ -7,13 +7,11 @@ from dataclasses import dataclass, replace
 
 from .. import names
 from ..errors import DerivationError, ModelError, RequestError
-from ..interface.sensitivities import differentiated, named
-from ..interface.table import variable_table
+from ..interface.table import differentiated, named, variable_table
 from ..interface.variables import VariableTable
 from ..mechanics import prune
 from ..mechanics.equations import EquationsOfMotion
-from ..mechanics.form import Form
-from ..mechanics.formulations.minimal import reduce
+from ..mechanics.formulations import Form, reduce
 from ..model.scene import EVERYTHING, Scene
 from ..model.selection import select
 from .steps import Derived

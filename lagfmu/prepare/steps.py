@@ -8,7 +8,7 @@ from typing import Any
 
 from ..interface.variables import VariableTable
 from ..mechanics.equations import EquationsOfMotion
-from ..mechanics.form import Form
+from ..mechanics.formulations import Form
 from ..model.elements import Expr
 from ..model.model import Contact, Model
 from ..model.scene import Scene

@@ -21,8 +21,7 @@ from ..files import write_whole
 from ..fmu.read import Trajectory, communication_points, experiment_of, read_description
 from ..fmu.write import REFERENCES
 from .check import Verification
-from .junit import as_json
-from .report import report
+from .pipeline import as_json, report
 from .simulate import simulate
 
 TOLERANCE = 1e-12

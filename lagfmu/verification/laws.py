@@ -20,8 +20,7 @@ from ..model.elements import Expr
 from ..model.laws import GROUND, Act, Laws, Where
 from ..numeric.closed import rotation
 from .check import Check
-from .closed_forms import measured
-from .evaluate import evaluate
+from .closed_forms import evaluate, measured
 
 Floats = NDArray[np.float64]
 U = 2.0**-53

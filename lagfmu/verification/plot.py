@@ -1,20 +1,64 @@
-"""A picture of a simulation: multipliers on top, the motion below, events marked."""
+"""A picture of a simulation: multipliers on top, the motion below, events marked.
+
+Figures of matplotlib, here and elsewhere, are without pyplot and whatever the backend.
+"""
 
 from __future__ import annotations
 
 import contextlib
+import io
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import matplotlib
 import numpy as np
+from matplotlib.figure import Figure
 
 from .. import names
-from ..errors import SettingError
+from ..errors import SettingError, UsageError
+from ..files import write_whole
 from ..fmu.read import Trajectory
 from ..model.units import for_reading
 from ..names import of_interest
+
+STYLE: dict[str, Any] = {
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.alpha": 0.25,
+    "axes.axisbelow": True,
+}
+
+
+class Drawn(Figure):
+    """A Figure; a notebook shows it as a picture."""
+
+    def _repr_png_(self) -> bytes:
+        picture = io.BytesIO()
+        self.savefig(picture, format="png", dpi=110)
+        return picture.getvalue()
+
+
+def save(figure: Figure, path: Path) -> Path:
+    """Write it, the same bytes each time; the ending says the format.  Raises BuildError; UsageError for
+    another ending."""
+    ending, drawn = path.suffix[1:], io.BytesIO()
+    metadata = {"Date": None} if ending == "svg" else {}
+    try:
+        with matplotlib.rc_context({"svg.hashsalt": "lagfmu"}):
+            figure.savefig(drawn, format=ending or "png", metadata=metadata, dpi=150)
+    except ValueError as error:
+        raise UsageError(f"cannot write the figure {str(path)!r}: {error}") from None
+    write_whole(path, drawn.getvalue())
+    return path
+
+
+def plain(text: str) -> str:
+    """A name or a unit as a label shows it: what stands between two dollars is no mathematics."""
+    return text.replace("$", r"\$")
+
 
 COLOURS = (
     *("#0b6e99", "#d9730d", "#0f7b6c", "#ad1a72"),
@@ -43,7 +87,6 @@ def plot(
 
     Raises SettingError if a name is unknown or the file cannot be written.
     """
-    from .figure import plain, save
 
     chosen = _chosen(result, names)
     with panels(result, units, chosen) as (figure, _):
@@ -56,7 +99,6 @@ def figure_of(
     result: Trajectory, units: Mapping[str, str], names: Sequence[str] = (), title: str = ""
 ) -> Any:
     """The same as a matplotlib Figure.  Raises SettingError if a name is unknown."""
-    from .figure import plain
 
     with panels(result, units, _chosen(result, names)) as (figure, _):
         if title:
@@ -81,8 +123,6 @@ def panels(
 ) -> Iterator[tuple[Any, list[Any]]]:
     """The figure and its panels, one a unit, multipliers first, while the style of it holds."""
     import matplotlib as mpl
-
-    from .figure import STYLE, Drawn, plain
 
     known = list(result.dtype.names or ())
     members_of: dict[tuple[bool, str, str], list[str]] = {}
@@ -192,7 +232,6 @@ def moments(result: Trajectory, events: str, of: str) -> list[float]:
 def _mark_events(axis: Any, result: Trajectory, known: Sequence[str], figure: Any) -> None:
     """A line at each event; with `figure` the first of each kind is named, above the panel, in rows
     so that no name lies over another."""
-    from .figure import plain
 
     start, end = result["time"][0], result["time"][-1]
     named = []

@@ -14,7 +14,7 @@ from ...fmu.face import Face
 from ...fmu.target import NATIVE, PYTHON
 from ...model.library import known
 from ...model.library import new as written
-from ...verification.exit_codes import FAILS
+from ...verification.pipeline import FAILS
 from ..options import (
     NARROWING,
     OPTIONS,

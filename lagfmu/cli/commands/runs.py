@@ -33,8 +33,8 @@ from ..options import (
 from ..terminal import console, kilobytes, plainly, say, say_wrote
 
 if TYPE_CHECKING:
-    from ...verification.junit import Report
-    from ...verification.result import Result
+    from ...verification.pipeline import Report
+    from ...verification.simulate import Result
 
 
 def simulate(
@@ -138,7 +138,7 @@ def _print_last(result: Result, names: Sequence[str] = ()) -> None:
     """The last values of the named variables, of all outputs without names."""
     from ...model.units import for_reading
     from ...page.table import new_table, print_whole
-    from ...verification.result import NOT_YET, as_text
+    from ...verification.simulate import NOT_YET, as_text
 
     title = f"{result.name} ({result.target}) at t = {result['time'][-1]:g} s"
     table = new_table(title, "variable", "value", "unit")
@@ -192,9 +192,8 @@ def verify(
     The exit code is the largest of all FMUs'.
     """
     from ...files import write_whole
-    from ...verification.junit import refused
+    from ...verification.pipeline import refused, report
     from ...verification.reference import Reference, read_table
-    from ...verification.report import report
     from ...verification.verify import verify as held
     from ..progress import finish, print_verdicts
 

@@ -253,8 +253,7 @@ def fit(
     from ...studio.fit.problem import bounds_of, derivatives_of, deviation_of, named
     from ...studio.fit.solve import TOLERANCE
     from ...studio.fit.solve import fit as found_by
-    from ...verification.exit_codes import FAILS
-    from ...verification.junit import text_of
+    from ...verification.pipeline import FAILS, text_of
 
     with plainly():
         sought, wanted = once(named(free or (), "=")), once(named(measure or (), ":"))
@@ -333,7 +332,7 @@ def sensitivity(
     from ...studio.sensitivity.local import ALL, TOLERANCE, made_for
     from ...studio.sensitivity.local import sensitivity as found_by
     from ...studio.sensitivity.ranges import over_ranges
-    from ...verification.junit import text_of
+    from ...verification.pipeline import text_of
 
     outputs = [n for text in of for n in listed(text)]
     by = [n for text in to or () for n in listed(text)] or ALL

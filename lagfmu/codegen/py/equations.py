@@ -8,15 +8,14 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ...mechanics.equations import EquationsOfMotion
-from ...mechanics.form import Form
+from ...mechanics.formulations import Form
 from ...mechanics.jumps import with_switch_states
 from ...model.elements import TIME, Expr
 from ...numeric.closed import OPERATIONS
 from ...numeric.cubic import Cubic
 from ...numeric.system import System
 from ..parts import Function, Parts, parts_of
-from .function import function, identifiers, table_name
-from .loops import in_loops
+from .function import function, identifiers, in_loops, table_name
 
 OBSERVED = ("t", "q", "v", "vdot", "u", "p", "lam", "Q")  # what outputs are functions of
 

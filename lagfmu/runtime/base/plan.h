@@ -1,8 +1,8 @@
-/* plan.h -- the order of a sparse elimination, found when the FMU was built (elimination.py).
+/* plan.h -- the order of a sparse elimination, found when the FMU was built (sparsity.py).
  *
  *   P M P^T = L D L^T ,   W = L^-1 P G^T ,   S = G M^-1 G^T = W^T D^-1 W ,   P' S P'^T = L' D' L'^T
  *
- * The members stand in the order of the dataclasses in elimination.py, which prints them. */
+ * The members stand in the order of the dataclasses in sparsity.py, which prints them. */
 #ifndef LAGFMU_PLAN_H
 #define LAGFMU_PLAN_H
 

@@ -124,7 +124,7 @@ SHARED void instance_set_input_derivative(Instance *x, const Variable *v, int or
 /* Times in s; a tolerance or a stop time that is not defined is NULL. */
 SHARED Status instance_set_up(Instance *x, const double *tolerance, double start, const double *stop);
 
-/* May the variable be set to the value now?  The rules of interface/rules.py, by the same table. */
+/* May the variable be set to the value now?  The rules of interface/variables.py, by the same table. */
 SHARED Status instance_settable(Instance *x, const Variable *v, double value);
 
 /* Sets a variable to a value that it may be set to: nothing happens where a parameter has these bits. */

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import SettingError, UnitError
-from ...interface.rules import problems_of, unsettable
+from ...interface.variables import problems_of, unsettable
 from ...model.rule import Rule, missing
 from ...model.units import parse_quantity, parse_scaled, parse_unit
 from ...verification.reference import read_table

@@ -38,8 +38,7 @@ def _draw(
     BuildError if it cannot be."""
     import matplotlib as mpl
 
-    from ...verification.figure import STYLE, Drawn, plain, save
-    from ...verification.plot import COLOURS
+    from ...verification.plot import COLOURS, STYLE, Drawn, plain, save
 
     outputs = list(deviations)
     with mpl.rc_context(STYLE | {"font.size": 10}):

@@ -19,7 +19,7 @@ from ...fmu.read import described_rules, kind_of, read_description
 from ...fmu.session import Session
 from ...fmu.target import NATIVE, missing_for_native
 from ...fmu.write import write
-from ...interface.rules import problems_of
+from ...interface.variables import problems_of
 from ...model.file import fmu_at, in_scene
 from ...model.model import Model
 from ...model.scene import EVERYTHING, Scene

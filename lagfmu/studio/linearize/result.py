@@ -211,7 +211,7 @@ class Linearization:
         """Write .json, or .mat (MATLAB: A, B, C, D, names, values, poles).  Raises UsageError for another."""
         out = Path(path)
         if out.suffix == ".json":
-            from ...verification.junit import text_of
+            from ...verification.pipeline import text_of
 
             write_whole(out, text_of(self.to_dict()).encode())
         elif out.suffix == ".mat":

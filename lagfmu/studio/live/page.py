@@ -32,9 +32,8 @@ from ...fmu.archive import pack
 from ...fmu.read import described_rules, experiment_of, kind_of
 from ...model.rule import MESSAGES, Rule
 from ...model.units import for_reading
-from ...page.documentation import heading
+from ...page.documentation import heading, template
 from ...page.picture import SETTABLE
-from ...page.documentation import template
 
 # of a variable; `reference`: its place.  What is seldom usual comes first
 USUAL: dict[str, Any] = {

@@ -23,9 +23,8 @@ from ...fmu.write import PAGE
 from ...model.file import fmu_at, in_scene
 from ...model.model import Model
 from ...model.scene import Scene
-from ...page import picture as presets
 from ...page.documentation import mathml
-from ...page.picture import IN_FMU, picture_of, read_picture
+from ...page.picture import PICTURE, PRESET, picture_of, preset_of, read_picture, read_preset
 from ...page.typeset import typeset
 from ...prepare.prepare import Prepared, prepare
 from ...prepare.starts import check_given, tell
@@ -95,7 +94,7 @@ def _told_by_prepared(prepared: Prepared) -> Told:
         (s.title, s.remark, [(e.label, safe_mathml(mathml(e.latex)), e.text) for e in s.equations])
         for s in typeset(prepared.form)
     ]
-    preset = presets.preset_of(prepared)
+    preset = preset_of(prepared)
     return Told(
         made.description, sections, picture_of(prepared), preset, {**made.runtime, **made.generated}
     )
@@ -111,9 +110,9 @@ def _told_by_fmu(path: Path) -> Told:
             if n.startswith("sources/") and n.endswith((".c", ".h"))
         }
         page = entry(archive, PAGE) if PAGE in names else b""
-        picture = read_picture(entry(archive, IN_FMU)) if IN_FMU in names else None
-        own = presets.IN_FMU
-        preset = presets.read_preset(entry(archive, own)) if own in names else None
+        picture = read_picture(entry(archive, PICTURE)) if PICTURE in names else None
+        own = PRESET
+        preset = read_preset(entry(archive, own)) if own in names else None
         description = entry(archive, "modelDescription.xml")
         return Told(description, equations_of(page), picture, preset, unbundled(carried))
 

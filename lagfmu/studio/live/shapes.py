@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...page.packed import values
+from ...page.picture import values
 
 Array = NDArray[np.float64]
 ROUND = 24  # corners of a circle

@@ -23,11 +23,10 @@ from ...fmu.archive import tool
 from ...fmu.read import experiment_of, kind_of, read_description
 from ...model.units import for_reading
 from ...verification.check import Verification
-from ...verification.evaluate import alone
+from ...verification.closed_forms import alone
 from ...verification.plot import SAID, moments
 from ...verification.reference import Driven, Reference
-from ...verification.result import Result, as_text
-from ...verification.simulate import simulate
+from ...verification.simulate import Result, as_text, simulate
 from ...verification.verify import verify
 from ..live.play import Told, told_by
 

@@ -19,11 +19,11 @@ from ...files import foreign, write_whole
 from ...fmu.write import as_fmu
 from ...model.model import Model
 from ...model.scene import Scene
-from ...page.template import template
+from ...page.documentation import template
 from ...verification.check import Check, Verification
 from ...verification.plot import COLOURS, figure_of
 from ...verification.reference import Driven, Reference
-from ...verification.result import as_text
+from ...verification.simulate import as_text
 from ..live.page import facts
 from ..live.view import sketch
 from ..sweep.plot import figure_of as of_study
@@ -99,7 +99,7 @@ def _misses(checks: Sequence[Check]) -> list[tuple[str, Markup]]:
     import matplotlib as mpl
     from matplotlib.figure import Figure
 
-    from ...verification.figure import STYLE
+    from ...verification.plot import STYLE
 
     drawn = []
     for k, check in enumerate(checks):

@@ -32,7 +32,7 @@ from ...fmu.read import (
 )
 from ...fmu.session import RefusalError, Session
 from ...fmu.write import as_fmu
-from ...interface.rules import problems_of, unsettable
+from ...interface.variables import problems_of, unsettable
 from ...model.model import Model
 from ...model.rule import Rule, missing
 from ...model.scene import Scene
@@ -56,8 +56,7 @@ def tornado(
     Figure, or with `out` the file.  Raises BuildError if it cannot be written."""
     import matplotlib as mpl
 
-    from ...verification.figure import STYLE, Drawn, plain, save
-    from ...verification.plot import COLOURS
+    from ...verification.plot import COLOURS, STYLE, Drawn, plain, save
 
     shown = {o: [b for b in rows if np.isfinite(b[1])][:MOST] for o, rows in bars.items()}
     heights = [0.6 + 0.28 * max(len(rows), 1) for rows in shown.values()]

@@ -25,8 +25,7 @@ from ... import names
 from ...fmu.archive import unpack
 from ...fmu.session import RefusalError, Session
 from ...fmu.target import PYTHON
-from ...verification.closed_forms import applies
-from ...verification.evaluate import alone
+from ...verification.closed_forms import alone, applies
 from .invariants import EPS, EQUATION, ROUNDING, Check, invariants, judged, laws, lost
 from .specimen import Drive, Facts, Run, Values, facts_of, opened, play
 

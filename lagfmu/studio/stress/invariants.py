@@ -43,8 +43,7 @@ from ...fmu.closed_forms import CarriedForm
 from ...fmu.read import Trajectory
 from ...model.elements import Expr
 from ...numeric import thresholds
-from ...verification.closed_forms import applies, landed
-from ...verification.evaluate import Compiled
+from ...verification.closed_forms import Compiled, applies, landed
 from .specimen import Facts, Run
 
 LEEWAY = 10.0

@@ -33,7 +33,7 @@ from sympy.core.relational import Relational
 from ... import names
 from ...files import write_whole
 from ...fmu.closed_forms import pack_closed_forms
-from ...mechanics.attitudes import angular_velocity
+from ...mechanics.kinematics import angular_velocity
 from ...model.attitude import written_out
 from ...model.closed_form import ClosedForm, in_variables, output
 from ...model.elements import TIME, Constraint, Expr, Tie

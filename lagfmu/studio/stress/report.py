@@ -10,7 +10,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from ...page.table import new_table
-from ...verification.junit import Case, Report
+from ...verification.pipeline import Case, Report
 from .probes import CONSISTENT, REFUSED, RIGHT, UNFINISHED, WRONG, Verdict
 
 FORMAT = 2

@@ -18,7 +18,7 @@ INK = "#1f5fa8"
 
 def plot(found: Any, path: Path) -> Path:
     """Draw the numbers that were kept.  Raises BuildError if the file cannot be written."""
-    from ...verification.figure import save
+    from ...verification.plot import save
 
     return save(figure_of(found), path)
 
@@ -28,7 +28,7 @@ def figure_of(found: Any) -> Any:
     import matplotlib as mpl
     from matplotlib.figure import Figure
 
-    from ...verification.figure import STYLE
+    from ...verification.plot import STYLE
 
     names = numbers(found)
     if not names:
@@ -47,7 +47,7 @@ def _drawn(found: Any, name: str) -> Any:
 
 
 def _label(found: Any, name: str) -> str:
-    from ...verification.figure import plain
+    from ...verification.plot import plain
 
     unit = for_reading(found[name].attrs.get("units", ""))
     return plain(f"{name} [{unit}]" if unit else name)

@@ -31,7 +31,7 @@ from ...fmu.read import (
     read_description,
 )
 from ...fmu.write import as_fmu
-from ...interface.rules import unsettable
+from ...interface.variables import unsettable
 from ...model.model import Model
 from ...model.rule import Rule
 from ...model.scene import Scene

@@ -24,7 +24,7 @@ from ...methods import METHODS
 from ...model.goal import HELD_OUT_MARGIN, MARGIN, Goal
 from ...model.model import Model
 from ...model.scene import Scene
-from ...page.template import template
+from ...page.documentation import template
 from ...prepare.prepare import prepare
 from ...verification.simulate import steps_of
 from .reference import Reference, Setting, ladder, observe, opened, refer, selected, wider

@@ -33,7 +33,7 @@ from ...fmu.session import Session
 from ...methods import FIXED_STEP, INTEGRATORS, MENU
 from ...page.table import new_table
 from ...verification.closed_forms import check_closed_form
-from ...verification.junit import Case, Report
+from ...verification.pipeline import Case, Report
 from ...verification.simulate import steps_of
 from ...verification.verify import closed_forms_in
 from .choose import Tick
@@ -306,7 +306,7 @@ def draw(found: Tradeoff, out: Path) -> Path:
     import matplotlib as mpl
     from matplotlib.figure import Figure
 
-    from ...verification.figure import STYLE, plain, save
+    from ...verification.plot import STYLE, plain, save
 
     factor = 1e3 / found.simulated
     with mpl.rc_context(STYLE | {"font.size": 10, "hatch.linewidth": 0.4}):

@@ -26,7 +26,7 @@ from ...fmu.read import Trajectory, communication_points, kind_of
 from ...fmu.session import RefusalError, Run, Session
 from ...methods import FIXED_STEP
 from ...names import METHOD, STEP, TOLERANCE
-from ...verification.evaluate import alone
+from ...verification.closed_forms import alone
 
 HALVINGS = 10  # of a fixed step, at most
 

@@ -22,7 +22,7 @@ function isClose(a, b) {
   return a === b || Math.abs(a - b) <= 1e-9 * Math.max(Math.abs(a), Math.abs(b));
 }
 
-/* Does a value hold a rule of interface/rules.py?  Their messages come with the facts. */
+/* Does a value hold a rule of interface/variables.py?  Their messages come with the facts. */
 const HOLDS = {
   settable: (v) => v.role !== "output",
   finite: (v, value) => typeof value === "number" && Number.isFinite(value),

@@ -1,4 +1,7 @@
-"""What every command that judges FMUs hands to a pipeline: JSON, JUnit's XML and the exit code of all."""
+"""What every command that judges FMUs hands to a pipeline: JSON, JUnit's XML and the exit code of all.
+
+The exit codes of every command, and the words for those that an FMU alone would give.
+"""
 
 from __future__ import annotations
 
@@ -9,8 +12,29 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..errors import LagfmuError, UsageError
-from .exit_codes import FAILS, HOLDS, NOT_RUN, VERDICTS, WRONG_USAGE
+from ..errors import LagfmuError, UsageError, UserInterruptError
+from .check import Check, Verification
+
+HOLDS, FAILS, WRONG_USAGE, NOT_RUN, INTERRUPTED, TERMINATED = 0, 1, 2, 3, 130, 143
+EXIT_CODES = {  # of every command
+    HOLDS: "done; where something was judged, all of it holds",
+    FAILS: "a statement fails, a probe is wrong, or a fit does not converge",
+    WRONG_USAGE: "wrong usage: an option, a name that is not known, a value that is not taken, a table that "
+    "cannot be read",
+    NOT_RUN: "a file cannot be read or written, a model cannot be built, an FMU cannot be run; the others "
+    "were",
+    INTERRUPTED: "interrupted (Ctrl-C)",
+    TERMINATED: "terminated (SIGTERM)",
+}
+VERDICTS = ("pass", "fail", "wrong usage", "not run")
+
+
+def code_of(error: LagfmuError) -> int:
+    """The exit code of a command that this error ends."""
+    if isinstance(error, UserInterruptError):
+        return INTERRUPTED
+    return WRONG_USAGE if isinstance(error, UsageError) else NOT_RUN
+
 
 # of XML 1.0
 NOT_IN_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
@@ -111,3 +135,30 @@ def as_junit(command: str, reports: Sequence[Report]) -> bytes:
 def _clean(text: str) -> str:
     """What XML cannot hold, as a mark."""
     return NOT_IN_XML.sub("\N{REPLACEMENT CHARACTER}", text)
+
+
+def report(file: str, found: Verification) -> Report:
+    """A case a statement; numbers as numbers."""
+    cases = [  # one run serves all: its time at the first
+        _case(c, found.name, 0.0 if k else found.seconds) for k, c in enumerate(found.checks)
+    ]
+    data = {
+        "name": found.name,
+        "simulated_s": found.simulated,
+        "wall_s": found.seconds,
+        "steps": found.steps,
+        "statements": [
+            {k: getattr(c, k) for k in ("name", "error", "allowed", "points", "detail", "verdict")}
+            for c in found.checks
+        ],
+        "uncovered_outputs": found.uncovered,
+        "closed_forms_left_out": found.left_out,
+    }
+    uncovered = {"uncovered outputs": ", ".join(found.uncovered)}
+    return Report(file, found, cases, data, properties=uncovered)
+
+
+def _case(check: Check, fmu: str, seconds: float) -> Case:
+    skipped = "not reached in this run" if check.points == 0 else ""
+    failure = str(check) if check.failed else ""
+    return Case(check.name, fmu, failure, skipped, seconds)

@@ -1,1 +1,0 @@
-"""The equations without multipliers, or in fewer coordinates."""
