@@ -25,8 +25,8 @@ from ...model.model import Model
 from ...model.scene import EVERYTHING, Scene
 from ...model.selection import select
 from ...prepare.prepare import prepare
-from ..live.playable import told_by
-from ..live.render import render
+from ..live.page import render
+from ..live.play import told_by
 from .chart import Chart, Rows, acting, chart
 from .checks import check_contacts, check_sliding
 from .equilibrium import find

@@ -18,10 +18,9 @@ import numpy as np
 
 from ...errors import UsageError
 from ...page.picture import names_in
-from ..live.moving import Moving
-from ..live.playable import Told
-from ..live.recording import recorded
-from ..live.render import Playable
+from ..live.page import Playable
+from ..live.play import Told, recorded
+from ..live.shapes import Moving
 from .chart import Chart, Rows
 from .equilibrium import place
 from .exchange import Exchange, Floats
