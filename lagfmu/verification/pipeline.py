@@ -10,10 +10,12 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..errors import LagfmuError, UsageError, UserInterruptError
-from .check import Check, Verification
+
+if TYPE_CHECKING:
+    from .check import Check, Verification
 
 HOLDS, FAILS, WRONG_USAGE, NOT_RUN, INTERRUPTED, TERMINATED = 0, 1, 2, 3, 130, 143
 EXIT_CODES = {  # of every command
