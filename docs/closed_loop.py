@@ -9,6 +9,7 @@ how the force changes (fmi2SetRealInputDerivatives); the errors are those of s a
 from __future__ import annotations
 
 import runpy
+import shutil
 import tempfile
 import zipfile
 from dataclasses import replace
@@ -181,5 +182,7 @@ if __name__ == "__main__":
         for step, held, passed in errors(folder):
             print(f"{step:<9g}  {held:.1e}  {passed:.1e}")
         print("as an SSP")
-        for step, off in of_ssp(ssp(folder), folder):
+        path = ssp(folder)
+        for step, off in of_ssp(path, folder):
             print(f"{step:<9g}  {off:.1e}")
+        print("wrote", shutil.copy(path, path.name))

@@ -447,6 +447,13 @@ def test_simulate_prints_what_is_asked_for_inputs_too():
     assert "did you mean 'lambda.rod'?" in text
 
 
+def test_the_heading_of_a_table_is_one_line():
+    """Wider than a table of one value, it says in one piece of what and when this is."""
+    arguments = ["simulate", str(MODELS / "slider_crank_bodies.py"), "-v", "force.A.x"]
+    told = CliRunner().invoke(app, arguments).output
+    assert re.search(r"^SliderCrankBodies \(\w+\) at t = 2 s *$", told, re.MULTILINE)
+
+
 def test_no_number_is_cut_at_80_columns(small, tmp_path):
     """A statement of 70 letters folds; its error, what is allowed and the verdict stand whole."""
     file = tmp_path / "long.py"

@@ -53,10 +53,14 @@ def print_whole(console: Console, drawn: Table) -> None:
         if column.no_wrap:
             column.min_width = max(map(_width, (column.header, *column.cells)))
     unbounded = console.options.update(width=10_000)
-    if console.measure(drawn, options=unbounded).minimum <= console.width:
+    narrow = console.measure(drawn, options=unbounded).minimum > console.width
+    if drawn.title or narrow:  # not by the table, which would fold it to its own width
+        console.print(drawn.title or "", style="bold", highlight=False)
+    if not narrow:
+        title, drawn.title = drawn.title, None
         console.print(drawn)
+        drawn.title = title
         return
-    console.print(drawn.title or "", style="bold", highlight=False)
     headings = [" ".join(str(c.header).split()) for c in drawn.columns]
     for cells in zip(*(c.cells for c in drawn.columns), strict=True):
         parts = [
