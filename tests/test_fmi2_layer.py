@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import random
 from ctypes import (
     byref,
     c_char_p,
@@ -550,6 +551,39 @@ def test_model_exchange_life_cycle(pendulum):
     one.does("EnterEventMode")
     one.does("EnterContinuousTimeMode")
     one.does("Terminate")
+
+
+@pytest.mark.parametrize("name", ["PendulumCartesian", "Gyroscope", "SliderCrankBodies"])
+def test_continuous_states_are_set_one_by_one(library, name):
+    """In Continuous-Time Mode SetReal of each state is SetContinuousStates of all (section 3.1), in whatever
+    order and number of calls, of quaternions too; in Event Mode and in co-simulation it is refused."""
+    lib = library(name)
+    one, two = lib.continuous(), lib.continuous()
+    states = states_of(lib)
+    begun = one.array("GetContinuousStates", len(states))
+    chance = random.Random(3)
+    for _ in range(3):
+        moved = [x + 1e-3 * chance.uniform(-1, 1) for x in begun]
+        one.states(moved)
+        for k in chance.sample(range(len(states)), len(states)):
+            two.set(states[k], moved[k])
+            assert two.get(states[k]) == moved[k]
+        found = [i.array("GetDerivatives", len(states)) for i in (one, two)]
+        assert found[0] == found[1]
+        assert one.outputs() == two.outputs()
+    for k in range(len(states)):  # what is not set again stays, though it was evaluated
+        moved[k] += 1e-3
+        one.states(moved)
+        two.set(states[k], moved[k])
+        found = [i.array("GetDerivatives", len(states)) for i in (one, two)]
+        scale = np.abs(found[0]).max()
+        np.testing.assert_allclose(found[1], found[0], rtol=1e-12, atol=1e-12 * scale)
+    text = two.refuses("SetReal", *two.set_call(states[0], math.nan))
+    assert "expected a finite number" in text
+    two.does("EnterEventMode")
+    for each in (two, lib().start()):
+        text = each.refuses("SetReal", *each.set_call(states[0], begun[0] + 1))
+        assert "before the end of the initialization" in text
 
 
 @pytest.mark.parametrize("name", MODELS)

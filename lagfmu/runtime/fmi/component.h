@@ -33,7 +33,6 @@ typedef enum { AS_DOUBLE, AS_INT, AS_LONG, AS_BOOL } Form;
 typedef struct {
     const char *name;
     unsigned types;
-    int states; /* 1: continuous states are set so too, while an importer's integrator moves them */
     Form form;
 } Group;
 

@@ -63,10 +63,11 @@ int component_get(Component *c, const Call *call, const Group *group, const unsi
     return CALL_OK;
 }
 
-/* Whether the importer moves it by itself, at any time or, where no event does so, at an event (FMI 3.0.2, 3.2.1). */
-static int moves_alone(const Component *c, const Group *group, const Variable *v) {
+/* Whether it is a state that the importer moves by itself, at any time or, where no event does so, at an event: as FMI
+ * 3.0.2 has it, 3.2.1; of FMI 2.0.4 section 3.1 says so, and the table of 3.2.3 not. */
+static int moves_alone(const Component *c, const Variable *v) {
     const Instance *x = &c->instance;
-    if (!group->states || !x->exchange || instance_state(v) < 0) return 0;
+    if (!x->exchange || instance_state(v) < 0) return 0;
     return x->phase == CONTINUOUS || (x->phase == EVENT && MODEL_SYSTEM->m == 0);
 }
 
@@ -79,7 +80,7 @@ int component_set(Component *c, const Call *call, const Group *group, const unsi
         const Variable *v = component_find(c, call, references[k], group);
         if (v == NULL) return CALL_ERROR;
         const double value = number_at(group->form, values, k);
-        if (moves_alone(c, group, v) ? instance_state_settable(&c->instance, v, value) != OK
+        if (moves_alone(c, v) ? instance_state_settable(&c->instance, v, value) != OK
                                   : instance_settable(&c->instance, v, value) != OK)
             return component_failed(c, CALL_ERROR);
     }
@@ -88,7 +89,7 @@ int component_set(Component *c, const Call *call, const Group *group, const unsi
     for (size_t k = 0; k < count && c->instance.phase != BETWEEN; k++) {
         const Variable *v = &VARIABLES[references[k]];
         const double value = number_at(group->form, values, k);
-        if (moves_alone(c, group, v)) instance_set_state(&c->instance, v, value);
+        if (moves_alone(c, v)) instance_set_state(&c->instance, v, value);
         else
             instance_put(&c->instance, v, value);
     }

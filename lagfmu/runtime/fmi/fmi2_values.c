@@ -6,10 +6,10 @@
 #include "fmi2.h"
 #include "fmi2_calls.h"
 
-static const Group REAL = {"Real", 1u << TYPE_REAL, 0, AS_DOUBLE};
-static const Group INTEGER = {"Integer", 1u << TYPE_INTEGER | 1u << TYPE_ENUMERATION, 0, AS_INT};
-static const Group BOOLEAN = {"Boolean", 1u << TYPE_BOOLEAN, 0, AS_INT};
-static const Group STRING = {"String", 0, 0, AS_INT}; /* no variable is one */
+static const Group REAL = {"Real", 1u << TYPE_REAL, AS_DOUBLE};
+static const Group INTEGER = {"Integer", 1u << TYPE_INTEGER | 1u << TYPE_ENUMERATION, AS_INT};
+static const Group BOOLEAN = {"Boolean", 1u << TYPE_BOOLEAN, AS_INT};
+static const Group STRING = {"String", 0, AS_INT}; /* no variable is one */
 
 fmi2Status fmi2GetReal(fmi2Component component, const fmi2ValueReference vr[], size_t nvr,
                        fmi2Real value[]) {

@@ -4,7 +4,7 @@
 
 static fmi3Status no_time_based_clock(Component *c, const Call *call, const fmi3ValueReference references[],
                                       size_t count) {
-    static const Group NONE = {"time-based Clock", 0, 0, AS_BOOL};
+    static const Group NONE = {"time-based Clock", 0, AS_BOOL};
     if (component_forbids(c, call)) return fmi3Error;
     if (count > 0 && references == NULL) return component_missing(c, call);
     return count == 0 ? fmi3OK : (fmi3Status)component_unknown(c, call, references[0], &NONE);

@@ -2,11 +2,11 @@
 #include "dependencies.h"
 #include "fmi3_component.h"
 
-SHARED_VALUE const Group FLOAT64 = {"Float64", 1u << TYPE_REAL, 1, AS_DOUBLE};
-SHARED_VALUE const Group CLOCK = {"Clock", 1u << TYPE_CLOCK, 0, AS_BOOL};
-static const Group INT32 = {"Int32", 1u << TYPE_INTEGER, 0, AS_INT};
-static const Group INT64 = {"Int64 or Enumeration", 1u << TYPE_ENUMERATION, 0, AS_LONG};
-static const Group BOOL = {"Boolean", 1u << TYPE_BOOLEAN, 0, AS_BOOL};
+SHARED_VALUE const Group FLOAT64 = {"Float64", 1u << TYPE_REAL, AS_DOUBLE};
+SHARED_VALUE const Group CLOCK = {"Clock", 1u << TYPE_CLOCK, AS_BOOL};
+static const Group INT32 = {"Int32", 1u << TYPE_INTEGER, AS_INT};
+static const Group INT64 = {"Int64 or Enumeration", 1u << TYPE_ENUMERATION, AS_LONG};
+static const Group BOOL = {"Boolean", 1u << TYPE_BOOLEAN, AS_BOOL};
 
 int component3_miscounts(Component *c, const Call *call, size_t values, size_t variables) {
     Why text;
@@ -68,7 +68,7 @@ FMI3_NO_ACCESS(UInt32)
 FMI3_NO_ACCESS(UInt64)
 FMI3_NO_ACCESS(String)
 
-static const Group BINARY = {"Binary", 0, 0, AS_DOUBLE};
+static const Group BINARY = {"Binary", 0, AS_DOUBLE};
 
 FMI3(fmi3Status, fmi3GetBinary)(fmi3Instance instance, const fmi3ValueReference valueReferences[],
                                 size_t nValueReferences, size_t valueSizes[], fmi3Binary values[], size_t nValues) {

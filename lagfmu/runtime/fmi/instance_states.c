@@ -15,9 +15,17 @@ Status instance_state_settable(Instance *x, const Variable *v, double value) {
     return isfinite(value) ? OK : fail(&x->solver.why, "'%s' = %s, expected a finite number", v->name, digits(value).text);
 }
 
+/* Quaternions as the importer has them: of those that are not set anew none changes. */
+static void unsettle(Instance *x) {
+    for (int k = 0; k < 4 * x->solver.system->quaternions; k++)
+        x->solver.state.q[x->solver.system->quaternion[k]] *= x->norm[k / 4];
+    instance_settled(x);
+}
+
 void instance_set_state(Instance *x, const Variable *v, double value) {
     State *state = &x->solver.state;
     const int j = instance_state(v), nq = x->solver.system->nq;
+    if (!x->unsettled) unsettle(x);
     if (j == system_states(x->solver.system)) state->now.lost = value;
     else
         *(j < nq ? &state->q[j] : &state->v[j - nq]) = value;
