@@ -20,8 +20,9 @@ from __future__ import annotations
 import gc
 import os
 import pickle
+import sys
 from collections.abc import Callable, Container, Iterable, Iterator, Sequence
-from contextlib import AbstractContextManager, ExitStack, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -129,6 +130,14 @@ def as_small_as_can_be() -> Iterator[None]:
         yield
 
 
+@contextmanager
+def without_a_page() -> Iterator[None]:
+    """FMUs are packed without the page of equations, which those of models/ have."""
+    with pytest.MonkeyPatch.context() as packing:
+        packing.setattr(sys.modules[write.__module__], "page", lambda *_: "")
+        yield
+
+
 @cache
 def model_file(name: str) -> ModelFile:
     """A file of models/, or beside this one, loaded once."""
@@ -203,7 +212,7 @@ def fmi3_fmu(prepared: Callable[[str], Prepared], shared_folder: Path) -> Fmu:
 @pytest.fixture(scope="session")
 def built(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
     """built(model), built(model, scene, closed_forms, target, fmi=3): the FMU of a test's own model, built
-    once."""
+    once; without page and C files, unless it is `whole`."""
     made: list[tuple[tuple[Any, ...], Path]] = []
 
     def get(
@@ -211,16 +220,18 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
         scene: Scene | None = None,
         closed_forms: Sequence[Any] = (),
         target: str = "native",
+        whole: bool = False,
         **interface: Any,
     ) -> Path:
         if target == "native" and find_compiler() is None:
             pytest.skip("no C compiler on this machine: native FMUs are not tested")
-        wanted = model, scene or Scene(model.name), tuple(closed_forms), target, interface
+        wanted = model, scene or Scene(model.name), tuple(closed_forms), target, whole, interface
         for known, path in made:
             if known == wanted:
                 return path
         folder = tmp_path_factory.mktemp("own")
-        path = build_fmu(model, folder, *wanted[1:4], check=False, **interface)
+        with nullcontext() if whole else without_a_page():
+            path = build_fmu(model, folder, *wanted[1:4], check=False, sources=whole, **interface)
         made.append((wanted, path))
         return made[-1][1]
 

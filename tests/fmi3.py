@@ -58,7 +58,7 @@ class Library:
     """The binary of an FMU, loaded once for any number of instances."""
 
     def __init__(self, path: Path, folder: Path) -> None:
-        self.description = fmpy.read_model_description(str(path))
+        self.description = fmpy.read_model_description(str(path), validate=False)
         self.variables = {v.name: v for v in self.description.modelVariables}
         with zipfile.ZipFile(path) as archive:
             (entry,) = (

@@ -1,4 +1,5 @@
-"""FMUs that run many times: unpacked, and the description read and checked, once."""
+"""FMUs that run many times: unpacked, and the description read, once (test_fmu_contract.py says that it is
+right)."""
 
 from __future__ import annotations
 
@@ -12,6 +13,7 @@ import fmpy
 
 from lagfmu.testing import unbundled
 
+UNUSED = ("documentation/", "sources/")  # no run needs them
 FOLDERS: list[tempfile.TemporaryDirectory[str]] = []  # each goes with this process
 
 
@@ -34,16 +36,19 @@ def sources(path: str | Path) -> dict[str, bytes]:
     """The C files that an FMU carries, of the runtime and of its own, by name."""
     with zipfile.ZipFile(path) as archive:
         carried = [n for n in archive.namelist() if n.startswith("sources/")]
+        assert carried, f"{path} was built without C files"
         return unbundled({n.removeprefix("sources/"): archive.read(n) for n in carried})
 
 
-def unpacked(path: str | Path) -> tuple[str, Any]:
-    """The folder and the description of an FMU as it is now."""
+def unpacked(path: str | Path, whole: bool = False) -> tuple[str, Any]:
+    """The folder and the description of an FMU as it is now; `whole`, with page and C files."""
     state = Path(path).stat()
-    return _unpacked(str(path), state.st_mtime_ns, state.st_size)
+    return _unpacked(str(path), whole, state.st_mtime_ns, state.st_size)
 
 
 @cache
-def _unpacked(path: str, *_: int) -> tuple[str, Any]:
+def _unpacked(path: str, whole: bool, *_: int) -> tuple[str, Any]:
     FOLDERS.append(tempfile.TemporaryDirectory(prefix="lagfmu_run_"))
-    return fmpy.extract(path, FOLDERS[-1].name), fmpy.read_model_description(path)
+    wanted = None if whole else lambda file: not file.startswith(UNUSED)
+    folder = fmpy.extract(path, FOLDERS[-1].name, wanted)
+    return folder, fmpy.read_model_description(path, validate=False)

@@ -38,7 +38,7 @@ def barred(built: Any) -> Barred:
 
     def get(name: str) -> Path:
         file, scene = scene_of(name)
-        return built(file.model, replace(scene, error_bars=True))
+        return built(file.model, replace(scene, error_bars=True), whole=True)
 
     return get
 

@@ -176,7 +176,7 @@ def test_verify_holds_its_closed_forms(fmi3_fmu: Fmu) -> None:
 
 def test_its_functions_are_defined_as_the_standard_declares_them(fmi3_fmu: Fmu) -> None:
     """A compiler that sees both, tests/fmi3_functions.h and the sources, finds no difference."""
-    folder, _ = runs.unpacked(fmi3_fmu("Hemisphere"))
+    folder, _ = runs.unpacked(fmi3_fmu("Hemisphere"), whole=True)
     declared = Path(__file__).parent / "fmi3_functions.h"
     flags = ("-std=c99", "-fsyntax-only", f"-I{RUNTIME_FILES['fmi3.h'].parent}", "-include")
     command = [compiler(), *flags, str(declared), str(Path(folder, "sources", "all.c"))]

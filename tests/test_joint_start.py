@@ -314,7 +314,8 @@ def test_an_angle_that_a_motor_prescribes_is_no_start(built: Any, native_fmu: Fm
     arm = Body("arm", 1.0, 0.02)
     pin = Revolute("A", ground.at((0, 0)), arm.at((-0.2, 0)))
     parts = {"plane": "xy", "bodies": [arm], "joints": [pin]}
-    driven = built(mechanism("Driven", **parts, loads=[Motor("M", "A", motion=True)]))
+    motor = Motor("M", "A", motion=True)
+    driven = built(mechanism("Driven", **parts, loads=[motor]), whole=True)
     assert "'angle.A' is calculated and cannot be set" in refused(driven, {"angle.A": 1.0})
     for fmu in (driven, native_fmu("PendulumCartesian")):
         assert not {"joint_start.c", "joint_coordinates.c"} & sources(fmu).keys()

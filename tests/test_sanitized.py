@@ -82,14 +82,15 @@ def unpacked(native_fmu, built):
     def get(name: str) -> tuple[Path, Any]:
         if name in OWN:
             model = OWN[name]()
-            path = built(model, Scene(model.name, tolerance=1e-9))
+            path = built(model, Scene(model.name, tolerance=1e-9), whole=True)
         elif name in SCENES:
             fmu, outputs, numbers = SCENES[name]
             file, scene = scene_of(fmu)
-            path = built(file.model, replace(scene, name=name, outputs=outputs, fixed=numbers))
+            narrow = replace(scene, name=name, outputs=outputs, fixed=numbers)
+            path = built(file.model, narrow, whole=True)
         else:
             path = native_fmu(name)
-        folder, description = runs.unpacked(path)
+        folder, description = runs.unpacked(path, whole=True)
         return Path(folder), description
 
     return get
@@ -188,7 +189,7 @@ def random_calls(
     path: Path, flags: tuple[str, ...], lives: int, before: tuple[str, ...] = ()
 ) -> None:
     """random3.c with the FMU behind it."""
-    unpacked_to, description = runs.unpacked(path)
+    unpacked_to, description = runs.unpacked(path, whole=True)
     made = program(Path(unpacked_to), f"{description.modelName}_random", flags, RANDOM)
     sizes = description.numberOfContinuousStates, len(description.eventIndicators)
     count = len(description.modelVariables)
@@ -219,7 +220,9 @@ def test_clocks_stand_random_calls_too(built):
     """The same of an FMU with clocks and event mode."""
     file, scene = scene_of("BouncingBall")
     random_calls(
-        built(file.model, replace(scene, name="Clocked"), fmi=3, clocks=True), SANITIZE, 200
+        built(file.model, replace(scene, name="Clocked"), whole=True, fmi=3, clocks=True),
+        SANITIZE,
+        200,
     )
 
 

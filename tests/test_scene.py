@@ -42,7 +42,7 @@ def make(built: Any) -> Callable[..., Path]:
 
     def made(name: str, /, **needs: Any) -> Path:
         file, scene = scene_of(name)
-        return built(file.model, replace(scene, **needs), file.closed_forms)
+        return built(file.model, replace(scene, **needs), file.closed_forms, whole=True)
 
     return made
 
@@ -279,7 +279,7 @@ def test_without_constraints_there_are_no_rungs_for_them(make: Make, built: Any)
         parameters=[Parameter(m, 1.0, "kg"), Parameter(k, 1.0, "N/m")],
         start={x: 1.0},
     )
-    path = built(spring)
+    path = built(spring, whole=True)
     for fmu in (place, path):
         held = {Path(n).stem for n in sources(fmu) if n.endswith(".c")}
         assert not {"orthogonal", "nullspace", "weighted", "cod", "leastnorm"} & held

@@ -22,6 +22,7 @@ LARGEST = 1 << 31  # bytes of all files of an FMU, unpacked
 LARGEST_TEXT = 64_000_000  # bytes of a file that is read as a whole
 MOST = 100_000  # files
 SHOWN = 3  # problems in a message
+READ = ("documentation/", "sources/")  # what people and compilers read: no run needs it
 LEVEL = 9  # of zlib: as small as can be
 DAMAGED = (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, struct.error)
 OUTSIDE = re.compile(r"[/\\]|.*[:\\]|(.*/)?\.\.(/|\Z)", re.S)  # absolute, of a drive, or above
@@ -104,7 +105,7 @@ def _problems(files: list[zipfile.ZipInfo]) -> list[str]:
 
 
 def unpack(fmu: Path) -> str:
-    """A temporary folder with the files of an FMU, which the caller removes.
+    """A temporary folder with what a run of an FMU needs, which the caller removes.
 
     Raises VerificationError as `opened` does, and TemporaryFolderError.
     """
@@ -113,7 +114,9 @@ def unpack(fmu: Path) -> str:
         with opened(fmu) as archive:
             try:
                 folder = tempfile.mkdtemp(prefix="lagfmu_")
-                archive.extractall(folder)
+                archive.extractall(
+                    folder, [n for n in archive.namelist() if not n.startswith(READ)]
+                )
             except OSError as error:
                 raise TemporaryFolderError(error) from None
     except BaseException:
