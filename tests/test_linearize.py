@@ -466,6 +466,59 @@ def test_a_contact_that_grazes_is_refused():
         linearize(model)
 
 
+def tied(pull: float) -> Model:
+    """A block of 2 kg on a floor with friction 0.5; a force pulls a carriage on a spring up, and a tenth
+    of it one sideways."""
+    z, w, x, s = dynamicsymbols("z w x s")
+    k, P, mu = symbols("k P mu", positive=True)
+    masses = [q.diff() ** 2 for q in (z, w, x, s)]
+    return Model(
+        "Tied",
+        lagrangian=m * sum(masses) / 2 - m * g * z - k * ((w - z) ** 2 + (s - x) ** 2) / 2,
+        forces={w: P, s: P / 10},
+        coordinates=dict.fromkeys((z, w, x, s), "m"),
+        constraints=[
+            Contact("floor", z),
+            Nonholonomic("slide", x.diff(), while_closed="floor"),
+            Friction("grip", of=["slide"], normal=multiplier("floor"), static=mu, kinetic=mu),
+        ],
+        parameters=[
+            *(MASS, GRAVITY, Parameter(k, 50.0, "N/m"), Parameter(P, pull, "N")),
+            Parameter(mu, 0.5, "1"),
+        ],
+        start={w: -0.1},
+    )
+
+
+def hung() -> Model:
+    """A ball of 2 kg above the floor on a spring of 100 N/m, which pulls it to the floor's level."""
+    z = dynamicsymbols("z")
+    k = symbols("k", positive=True)
+    return Model(
+        "Hung",
+        lagrangian=m * z.diff() ** 2 / 2 - m * g * z - k * z**2 / 2,
+        coordinates={z: "m"},
+        constraints=[Contact("floor", z)],
+        parameters=[MASS, GRAVITY, Parameter(k, 100.0, "N/m")],
+        start={z: 0.1},
+    )
+
+
+@pytest.mark.parametrize(
+    ("model", "told"),
+    [
+        (tied(30.0), r"contact 'floor' would have to pull \(lambda.floor = -10.38"),
+        (tied(18.0), r"friction 'grip' would slip \(margin.grip = -0.99"),
+        (hung(), r"contact 'floor' would be passed through \(residual.floor = -0.1962"),
+    ],
+)
+def test_a_rest_that_contacts_and_frictions_do_not_allow_is_refused(model, told):
+    """As they stand at the start: a block of 19.62 N that comes to be pulled up by 30 N; one that presses
+    with 1.62 N and is pulled sideways by 1.8 N; a ball that its weight takes below the floor by m g/k."""
+    with pytest.raises(SimulationError, match=told):
+        linearize(model, equilibrium=True)
+
+
 def test_a_time_after_a_departure_is_refused(native_fmu):
     """The particle leaves the hemisphere: before, it is linearized beside its motion; after, not."""
     fmu = native_fmu("Hemisphere")
