@@ -169,7 +169,7 @@ def _probe(
             except LateError:
                 answer, detail = UNFINISHED, f"no answer within {limit:g} s"
             except DiedError as died:
-                answer, detail = WRONG, f"the process was taken down ({_end(died, said)})"
+                answer, detail = WRONG, f"the process crashed ({_end(died, said)})"
             spent = time.monotonic() - begun
             rows.append(Verdict(probe.family, probe.name, answer, detail, "", 0.0, 0, spent))
     return rows

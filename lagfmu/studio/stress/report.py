@@ -19,12 +19,11 @@ COLOURS = dict(zip(VERDICTS, ("green", "green", "cyan", "bold red", "yellow"), s
 WORRY, NO_WORRY = "look at it: near the model's own values", "no worry: far from them"
 UNFIT = "no worry: a method for other models"
 MEANING = (
-    "right: every check held. consistent: so did Lagrange's equations and the constraints at each "
-    "instant, but nothing could be said of the course of the motion. refused: discard or error, with a "
-    "message that names the cause, and everything before it right. wrong: a check failed, the process "
-    "was taken down, or a refusal had no cause. unfinished: still at work at the time limit; nothing is "
-    "known. near: refusals of values within a factor of ten of the model's own, which a user should look "
-    "at. Ratio: the error of the check that came nearest to its limit, over that limit."
+    "right: every check held. consistent: every check at single instants held; the course of the motion "
+    "could not be judged. refused: the FMU returned an error with the cause, and everything before was "
+    "right. wrong: a check failed, the process crashed, or a refusal gave no cause. unfinished: still "
+    "running at the time limit. near: refusals of values within a factor of ten of the model's own: look "
+    "at them. ratio: the error of the check that came nearest to its limit, over that limit."
 )
 
 
