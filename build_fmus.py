@@ -34,10 +34,9 @@ from lagfmu.api import package
 from lagfmu.cli.terminal import prepare_streams
 from lagfmu.files import write_whole
 from lagfmu.fmu.compiler import HOST
-from lagfmu.fmu.face import USUAL, Face
 from lagfmu.fmu.native import takes_long
 from lagfmu.fmu.python import refusals
-from lagfmu.fmu.target import NATIVE, PYTHON, TARGETS, missing_for_native
+from lagfmu.fmu.target import NATIVE, PYTHON, TARGETS, USUAL, Face, missing_for_native
 from lagfmu.model.file import load
 from lagfmu.prepare.prepare import Prepared, prepare
 

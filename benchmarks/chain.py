@@ -39,10 +39,9 @@ from lagfmu.bodies import Body, Gravity, Ground, Revolute, mechanism
 from lagfmu.codegen.py.equations import source
 from lagfmu.fmu.binary import instantiated
 from lagfmu.fmu.compiler import chosen
-from lagfmu.fmu.face import USUAL
-from lagfmu.fmu.native import sources_of
+from lagfmu.fmu.native import lay_out, sources_of
 from lagfmu.fmu.read import read_description
-from lagfmu.fmu.trial import lay_out
+from lagfmu.fmu.target import USUAL
 from lagfmu.fmu.write import write
 from lagfmu.mechanics.formulations import Form
 from lagfmu.names import STEPS

@@ -32,8 +32,7 @@ import numpy as np
 from scipy.integrate import quad
 
 from lagfmu import build_fmu
-from lagfmu.fmu.batch import LAST, Plan, run_batch
-from lagfmu.fmu.session import Session
+from lagfmu.fmu.session import LAST, Plan, Session, run_batch
 from lagfmu.model.file import load
 
 os.environ.setdefault(

@@ -35,8 +35,7 @@ import numpy as np
 from drawn_systems import drawn
 
 from lagfmu.errors import LagfmuError
-from lagfmu.fmu.batch import LAST, Plan, run_batch
-from lagfmu.fmu.session import Session
+from lagfmu.fmu.session import LAST, Plan, Session, run_batch
 from lagfmu.fmu.write import write
 from lagfmu.model.file import load
 from lagfmu.model.model import Model

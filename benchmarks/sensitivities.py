@@ -42,8 +42,7 @@ from programs import unpacked
 
 from lagfmu import names
 from lagfmu.errors import LagfmuError
-from lagfmu.fmu.batch import LAST, Plan, run_batch
-from lagfmu.fmu.session import Session
+from lagfmu.fmu.session import LAST, Plan, Session, run_batch
 from lagfmu.fmu.write import write
 from lagfmu.model.model import Model
 from lagfmu.model.scene import Scene

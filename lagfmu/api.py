@@ -14,9 +14,8 @@ from rich.console import Console
 
 from .errors import VerificationError
 from .fmu.compiler import HOST, chosen, host
-from .fmu.face import USUAL, Face
 from .fmu.native import try_start
-from .fmu.target import NATIVE, PYTHON
+from .fmu.target import NATIVE, PYTHON, USUAL, Face
 from .fmu.write import put, write
 from .model.closed_form import ClosedForm, Conserved
 from .model.file import in_scene

@@ -15,14 +15,13 @@ from .codegen.py.equations import lower
 from .files import write_whole
 from .fmu import archive, compiler, described
 from .fmu import target as targets
+from .fmu.archive import bundled, reached, unbundled
 from .fmu.archive import version as archive_version
-from .fmu.batch import LAST, MAX, MEAN, TIME_OF_MAX, Plan, in_session, run_batch
-from .fmu.bundle import bundled, reached, unbundled
 from .fmu.closed_forms import CarriedForm, carried, pack_closed_forms, unpack_closed_forms
 from .fmu.compiler import NAMES, PLATFORMS, chosen, compile_libraries, find_compiler, host
+from .fmu.described import terminals
 from .fmu.description import model_description
 from .fmu.description3 import build_description
-from .fmu.face import Face
 from .fmu.native import GENERATED, sources_of
 from .fmu.read import (
     Trajectory,
@@ -32,9 +31,18 @@ from .fmu.read import (
     read_description,
     target_in,
 )
-from .fmu.session import RefusalError, Session
-from .fmu.target import NoCompilerWarning
-from .fmu.terminals import terminals
+from .fmu.session import (
+    LAST,
+    MAX,
+    MEAN,
+    TIME_OF_MAX,
+    Plan,
+    RefusalError,
+    Session,
+    in_session,
+    run_batch,
+)
+from .fmu.target import Face, NoCompilerWarning
 from .fmu.write import as_built, write
 from .interface.variables import problems_of
 from .mechanics import simplification

@@ -239,7 +239,7 @@ def test_one_door_writes_files() -> None:
         *("studio/report/report.py", "studio/sweep/results.py", "studio/sweep/sweep.py"),
     }
     temporary = {
-        *("fmu/compiler.py", "fmu/trial.py", "verification/simulate.py"),
+        *("fmu/compiler.py", "fmu/native.py", "verification/simulate.py"),
         "studio/report/pdf.py",
     }
     assert found <= beside | temporary, found - beside - temporary
@@ -253,7 +253,6 @@ def test_one_loop_runs_an_fmu() -> None:
     found = {path for path in MODULES if steps.search(path.read_text(encoding="utf-8"))}
     assert {p.relative_to(ROOT).as_posix() for p in found} == {
         "fmu/binary.py",
-        "fmu/binary3.py",
         "fmu/session.py",
     }
 

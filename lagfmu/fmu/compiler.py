@@ -27,7 +27,7 @@ from pathlib import Path
 
 from ..errors import BuildError, TemporaryFolderError, UsageError
 from ..methods import INTEGRATORS
-from .bundle import reached
+from .archive import reached
 
 HOST, ALL = "host", "all"
 TIMEOUT = 600  # seconds for one call of the compiler

@@ -24,8 +24,7 @@ from ..mechanics.formulations import Form, sharing_inertia
 from ..model.model import Contact
 from ..prepare.consistency import posed
 from ..prepare.prepare import Prepared
-from .capabilities import offers_exchange
-from .described import Unknown, as_text, structure_of
+from .described import Unknown, as_text, offers_exchange, structure_of
 
 
 class GivenMultipliers(Dependencies):

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
+from pathlib import Path
 
 from ..codegen.c.equations import entanglements, model_source
 from ..codegen.c.interface import (
@@ -14,19 +16,37 @@ from ..codegen.c.interface import (
     optional_source,
     variables_source,
 )
-from ..errors import BuildError
+from ..errors import BuildError, CannotStartError
 from ..methods import SEPARABLE
 from ..prepare.prepare import Prepared
-from .archive import pack, tool
-from .bundle import BUNDLE, bundled, linked, reached
-from .capabilities import interfaces_of
+from .archive import BUNDLE, bundled, linked, pack, reached, tool
 from .compiler import HOST, Platform, chosen, compile_libraries, host, is_first
-from .described import untold
+from .described import interfaces_of, untold
 from .description import guid_of, model_description
 from .description3 import arrays, build_description, dependencies
-from .face import USUAL, Face
-from .target import missing_for_native
-from .trial import check_start
+from .session import RefusalError, Session
+from .target import USUAL, Face, missing_for_native
+
+
+def check_start(prepared: Prepared, description: bytes, library: bytes, path: str) -> None:
+    """Initialize an instance of `library`, that of this machine, whose place in the FMU is `path`.  Raises
+    CannotStartError with its reason."""
+    with tempfile.TemporaryDirectory(prefix="lagfmu_") as folder:
+        lay_out(Path(folder), description, library, path)
+        try:
+            with Session(folder) as session:
+                session.begin()
+        except RefusalError as error:
+            raise CannotStartError(prepared.model.name, [error.message], prepared) from error
+
+
+def lay_out(folder: Path, description: bytes, library: bytes, path: str) -> None:
+    """An FMU as it lies unpacked, of its description and a library alone."""
+    (folder / "modelDescription.xml").write_bytes(description)
+    place = folder / path
+    place.parent.mkdir(parents=True)
+    place.write_bytes(library)
+
 
 ALL = "all.c"
 FLOORS = ("base", "linear", "ode", "mechanics", "simulation", "fmi")  # of the runtime
@@ -54,7 +74,7 @@ class Sources:
     def shipped(self) -> dict[str, bytes]:
         """Those that the FMU carries, from which it can be compiled anew."""
         own = sorted(f for f in self.generated if f.endswith(".c"))
-        return {**bundled(self.runtime, self.generated), ALL: including([BUNDLE, *own])}
+        return {**bundled(self.runtime, self.generated), ALL: _including([BUNDLE, *own])}
 
     def compiled(self, name: str, platforms: Sequence[Platform]) -> dict[str, bytes]:
         """Folder -> library; see compiler.compile_libraries.
@@ -62,12 +82,12 @@ class Sources:
         optional.c counts as of the runtime: it is the same for all FMUs that hold the same parts of it.
         """
         own = {**self.generated}
-        everything = runtime_files() | {OPTIONAL: own.pop(OPTIONAL)}
+        everything = _runtime_files() | {OPTIONAL: own.pop(OPTIONAL)}
         gone = everything.keys() - {*self.runtime, OPTIONAL}
         return compile_libraries(name, own, everything, platforms, gone)
 
 
-def including(files: Iterable[str]) -> bytes:
+def _including(files: Iterable[str]) -> bytes:
     """all.c of these C files."""
     includes = "".join(f'#include "{file}"\n' for file in files)
     return INCLUDING.format(file=ALL, includes=includes).encode()
@@ -131,7 +151,7 @@ def sources_of(prepared: Prepared, listed: bool = True, face: Face = USUAL) -> S
             f"scene {scene.name!r}: {scene.method} cannot step these equations: {'; '.join(problems)}; "
             "choose another method"
         )
-    everything = {f: text for f, text in runtime_files().items() if face.holds(f)}
+    everything = {f: text for f, text in _runtime_files().items() if face.holds(f)}
     integrators = held(scene, form)
     measured, joints = bool(table.measured), bool(form.joint_coordinates)
     tangents = needs_tangents(scene, system, face.dae)
@@ -170,7 +190,7 @@ def sources_of(prepared: Prepared, listed: bool = True, face: Face = USUAL) -> S
     return Sources(description, runtime, generated | identity)
 
 
-def runtime_files() -> dict[str, bytes]:
+def _runtime_files() -> dict[str, bytes]:
     """Name -> content of the runtime's C files, which have different names in all folders, floor by floor."""
     return {
         file.name: file.read_bytes()
@@ -182,5 +202,5 @@ def runtime_files() -> dict[str, bytes]:
 
 def takes_long(platforms: Sequence[str]) -> bool:
     """True if the runtime has to be compiled first, which for Windows takes about a minute."""
-    runtime = {file: text for file, text in runtime_files().items() if file != OPTIONAL}
+    runtime = {file: text for file, text in _runtime_files().items() if file != OPTIONAL}
     return is_first(chosen(platforms), runtime)

@@ -1,25 +1,32 @@
-"""The `python` target: generated script + the reference engine -> pythonfmu -> a reproducible archive."""
+"""The `python` target: generated script + the reference engine -> pythonfmu -> a reproducible archive.
+
+The slave of the python target in this process, without an FMU around it: a session calls it as it calls
+the library of one, by the names of fmpy's FMU2Slave.
+"""
 
 from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import pythonfmu
+from fmpy.fmi1 import FMICallException
 
 from .. import names
 from ..errors import BuildError
-from ..interface.variables import Variable, VariableTable
+from ..interface.variables import Variable, VariableTable, rules_of
 from ..mechanics.kinematics import start_names
 from ..methods import IN_PYTHON, NUMBERS
 from ..numeric.closed import OPERATIONS
 from ..prepare.prepare import Prepared
 from .archive import pack, version
+from .binary import Hear
 from .description import model_description
+from .read import Experiment
 from .slave import script
 from .target import missing_for_native
 
@@ -146,7 +153,7 @@ def offered(prepared: Prepared) -> VariableTable:
     return table.offering([m for m in prepared.scene.selectable if m in IN_PYTHON])
 
 
-def slave_of(prepared: Prepared) -> Any:
+def _slave_of(prepared: Prepared) -> Any:
     """What the FMU's script makes an instance of, for this process.  Raises BuildError."""
     from .slave.fmi2 import LagfmuSlave  # and with it the solver
 
@@ -213,3 +220,77 @@ def _digest(*parts: bytes) -> str:
     for part in parts:
         digest.update(len(part).to_bytes(8, "big") + part)
     return digest.hexdigest()[:16]
+
+
+DISCARD, ERROR = 2, 3  # statuses
+CALLS = {  # of a session -> of the slave
+    "enterInitializationMode": "enter_initialization_mode",
+    "exitInitializationMode": "exit_initialization_mode",
+    "terminate": "terminate",
+    **{f"get{kind}": f"get_{kind.lower()}" for kind in ("Real", "Integer", "Boolean")},
+    **{f"set{kind}": f"set_{kind.lower()}" for kind in ("Real", "Integer", "Boolean")},
+}
+
+
+class InProcess:
+    """A prepared model, for a session: what its slave's variables are called and may be set to, its default
+    experiment, and `instantiated(hear)`.  Raises BuildError if the python target cannot run it."""
+
+    def __init__(self, prepared: Prepared) -> None:
+        table, scene = offered(prepared), prepared.scene
+        self.prepared, self.variables, self.rules = prepared, table.variables, rules_of(table)
+        self.reference = dict(table.position)
+        self.experiment = Experiment(scene.stop_time, scene.step_size, scene.tolerance)
+
+    def instantiated(self, hear: Hear) -> SlaveInProcess:
+        """An instance, of which `hear` is told what it logs."""
+        return SlaveInProcess(self.prepared, hear)
+
+
+class SlaveInProcess:
+    """An instance of the slave that a python FMU of `prepared` holds; `hear` is told what it logs."""
+
+    def __init__(self, prepared: Prepared, hear: Hear) -> None:
+        self.kind, self.name, self.hear = _slave_of(prepared), prepared.scene.name, hear
+        self.reset()
+
+    def __getattr__(self, name: str) -> Callable[..., Any]:
+        if name not in CALLS:
+            raise AttributeError(name)
+        method = getattr(self.slave, CALLS[name])
+        return lambda *arguments: self._called(name, method, *arguments)
+
+    def reset(self) -> None:
+        """A new instance."""
+        self.slave = self.kind(instance_name=self.name)
+
+    def freeInstance(self) -> None:
+        """Nothing is held."""
+
+    def setupExperiment(
+        self,
+        tolerance: float | None,
+        startTime: float,
+        stopTime: float | None,
+    ) -> None:
+        """Times in s."""
+        experiment = (startTime, stopTime, tolerance)
+        self._called("setupExperiment", self.slave.setup_experiment, *experiment)
+
+    def doStep(self, time: float, size: float) -> None:
+        """A communication step [s]."""
+        if not self._called("doStep", self.slave.do_step, time, size):
+            raise FMICallException("doStep", DISCARD)
+
+    def _called(self, name: str, method: Callable[..., Any], *arguments: Any) -> Any:
+        from .slave.fmi2 import Refused  # it was loaded with the slave
+
+        try:
+            return method(*arguments)
+        except Refused as error:  # without what is done to a text on its way to an importer
+            self.hear(ERROR, str(error.__context__ or error))
+            raise FMICallException(name, ERROR) from error
+        finally:
+            for m in self.slave.log_queue:
+                self.hear(int(m.status), m.msg)
+            self.slave.log_queue.clear()

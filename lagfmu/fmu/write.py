@@ -31,14 +31,11 @@ from ..prepare.prepare import Prepared, prepare
 from ..prepare.starts import check_given, tell
 from . import native, python
 from .archive import pack
-from .capabilities import offers_exchange
 from .closed_forms import pack_closed_forms
 from .compiler import HOST
 from .dae import MANIFEST, check_dae, manifest, multiplier_sizes
-from .described import untold
-from .face import USUAL, Face
-from .target import NATIVE, target_of
-from .terminals import IN_FMU, terminals
+from .described import IN_FMU, offers_exchange, terminals, untold
+from .target import NATIVE, USUAL, Face, target_of
 
 LOG = logging.getLogger("lagfmu")
 SMALLEST_NOMINAL = 1e-30  # what is smaller is no size, but what neither moves nor is pushed

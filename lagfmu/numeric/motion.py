@@ -2,7 +2,7 @@
 
 A friction sticks (its rows act) where there is no slip velocity and |lambda_t| <= mu_s N; else it slips along
 e, its slip velocity or against lambda_t, with lambda_t = -mu_k N e.  That serves the nominals alone: whether
-the laws of frictions and contacts have one solution together is asked of the native FMU (fmu/trial.py).
+the laws of frictions and contacts have one solution together is asked of the native FMU (fmu/native.py).
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from ..fmu.laws import motion_of, needed, stated
+from ..fmu.closed_forms import motion_of, needed, stated
 from ..fmu.read import Trajectory
 from ..model.elements import Expr
 from ..model.laws import GROUND, Act, Laws, Where

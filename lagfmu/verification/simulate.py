@@ -20,8 +20,16 @@ import numpy as np
 from .. import names
 from ..errors import LagfmuWarning, SettingError, SimulationError
 from ..fmu import native
-from ..fmu.inputs import check_inputs, columns_at, jumps
-from ..fmu.read import Trajectory, communication_points, has_error_bars, read_description, target_in
+from ..fmu.read import (
+    Trajectory,
+    check_inputs,
+    columns_at,
+    communication_points,
+    has_error_bars,
+    jumps,
+    read_description,
+    target_in,
+)
 from ..fmu.session import DISCARD, WARNING, RefusalError, Run, Session
 from ..fmu.target import PYTHON, target_of
 from ..fmu.write import as_built
@@ -38,7 +46,7 @@ from ..prepare.starts import check_given, tell
 from .reference import Driven, driven
 
 if TYPE_CHECKING:
-    from ..fmu.inprocess import InProcess
+    from ..fmu.python import InProcess
 
 
 SHOWN = 24  # rows of a table
@@ -264,7 +272,7 @@ def _of_model(prepared: Prepared, target: str, asked: _Asked) -> Result:
     name, structure = prepared.scene.name, prepared.structure
     check_given(prepared.model.name, structure.start.moved, structure.missed)
     if target == PYTHON:
-        from ..fmu.inprocess import InProcess  # and with it the solver, which no native FMU needs
+        from ..fmu.python import InProcess  # and with it the solver, which no native FMU needs
 
         rows = _ran(InProcess(prepared), name, asked)
     else:

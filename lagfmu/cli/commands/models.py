@@ -10,8 +10,7 @@ import typer
 
 from ...errors import UsageError, VerificationError
 from ...fmu.compiler import HOST, NAMES
-from ...fmu.face import Face
-from ...fmu.target import NATIVE, PYTHON
+from ...fmu.target import NATIVE, PYTHON, Face
 from ...model.library import known
 from ...model.library import new as written
 from ...verification.pipeline import FAILS

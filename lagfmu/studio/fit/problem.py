@@ -43,7 +43,7 @@ class Experiment:
 @dataclass(frozen=True)
 class Series:
     """An experiment as the FMU knows it, in SI units: `time` (n,) [s], `measured` columns (n,) with NaN in
-    gaps, `inputs` a table for fmu/inputs.py or None, `values` that are set; `unused`: what of its table is
+    gaps, `inputs` a table for fmu/read.py or None, `values` that are set; `unused`: what of its table is
     used for nothing."""
 
     name: str

@@ -12,8 +12,7 @@ from scipy import optimize
 
 from ... import names
 from ...errors import SettingError, SimulationError
-from ...fmu.inputs import columns_at, jumps, warn_of_rates
-from ...fmu.read import communication_points
+from ...fmu.read import columns_at, communication_points, jumps, warn_of_rates
 from ...fmu.session import RefusalError, Session
 from ...fmu.write import as_fmu
 from ...model.model import Model

@@ -14,8 +14,7 @@ import numpy as np
 
 from ...errors import BuildError
 from ...files import write_whole
-from ...fmu.archive import entry, opened
-from ...fmu.bundle import unbundled
+from ...fmu.archive import entry, opened, unbundled
 from ...fmu.compiler import WASM, compile_libraries, find_compiler
 from ...fmu.native import ALL, GENERATED, IDENTITY, sources_of
 from ...fmu.read import read_description

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ...fmu.terminals import ICON
+from ...fmu.described import ICON
 from ...numeric.instant import at_start, expanded
 from ...page.picture import names_in, picture_of
 from ...prepare.consistency import posed

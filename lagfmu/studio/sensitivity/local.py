@@ -20,15 +20,18 @@ from rich.table import Table
 
 from ... import names
 from ...errors import SettingError, SimulationError
-from ...fmu.inputs import check_inputs, columns_at, jumps, warn_of_rates
 from ...fmu.read import (
     Trajectory,
+    check_inputs,
+    columns_at,
     communication_points,
     described_rules,
     experiment_of,
+    jumps,
     kind_of,
     obstacle,
     read_description,
+    warn_of_rates,
 )
 from ...fmu.session import RefusalError, Session
 from ...fmu.write import as_fmu

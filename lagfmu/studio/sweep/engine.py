@@ -23,7 +23,7 @@ from typing import Any
 
 from ...errors import SimulationError
 from ...fmu.archive import version
-from ...fmu.batch import Outcome, Plan
+from ...fmu.session import Outcome, Plan
 from ..host import EndedError
 from .design import Values
 from .process import SessionProcess

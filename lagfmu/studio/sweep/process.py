@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import SimulationError
-from ...fmu.batch import Outcome, Plan, run_batch
-from ...fmu.session import RefusalError, Session
+from ...fmu.session import Outcome, Plan, RefusalError, Session, run_batch
 from ..host import DiedError, Host, LateError, serve
 
 CRASHED, TIMED_OUT = 6, 7  # status of a run whose process died, was killed; those of FMI end at 5

@@ -29,8 +29,7 @@ import numpy as np
 from ... import names
 from ...errors import LagfmuWarning, SettingError, SimulationError
 from ...files import content_of, foreign, json_of, parquet_of, write_whole
-from ...fmu.batch import LAST, MAX, MEAN, MIN, TIME_OF_MAX, Outcome
-from ...fmu.session import KINDS, STATUS
+from ...fmu.session import KINDS, LAST, MAX, MEAN, MIN, STATUS, TIME_OF_MAX, Outcome
 from ...model.rule import missing
 from .design import Design
 from .process import CRASHED, TIMED_OUT

@@ -19,17 +19,19 @@ from numpy.typing import NDArray
 from ...errors import SettingError, SimulationError
 from ...files import write_whole
 from ...fmu.archive import unpack, version
-from ...fmu.batch import Plan
-from ...fmu.inputs import check_inputs, columns_at, warn_of_rates
 from ...fmu.read import (
     Trajectory,
+    check_inputs,
+    columns_at,
     communication_points,
     described_rules,
     experiment_of,
     kind_of,
     obstacle,
     read_description,
+    warn_of_rates,
 )
+from ...fmu.session import Plan
 from ...fmu.write import as_fmu
 from ...interface.variables import unsettable
 from ...model.model import Model
