@@ -20,8 +20,6 @@ from .model.model import (
     Parameter,
     Peak,
 )
-from .model.norms import norm
-from .model.page import Page
 from .model.picture import (
     Arrow,
     Box,
@@ -30,13 +28,14 @@ from .model.picture import (
     Frame,
     Ground,
     Line,
+    Page,
     Pivot,
     Rod,
     Sphere,
     Spring,
     Track,
 )
-from .model.reactions import force_of_constraint, multiplier
+from .model.reactions import force_of_constraint, multiplier, norm
 from .model.scene import Scene
 from .model.spline import Spline
 from .studio.fit.problem import Experiment

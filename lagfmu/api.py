@@ -19,9 +19,8 @@ from .fmu.target import NATIVE, PYTHON, USUAL, Face
 from .fmu.write import put, write
 from .model.closed_form import ClosedForm, Conserved
 from .model.file import in_scene
-from .model.goal import parse
 from .model.model import Model
-from .model.scene import Scene
+from .model.scene import Scene, parse
 from .page.documentation import html
 from .page.table import printed
 from .page.text import show as show_prepared

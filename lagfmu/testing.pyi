@@ -52,17 +52,14 @@ from .mechanics.jumps import jumps_of, with_jumps
 from .model.attitude import Carried, rotation_matrix, written_out
 from .model.differential import Differential
 from .model.dimensions import check_dimension, dimension_of
-from .model.elements import TIME
-from .model.expression import LONGEST_SUM, read_formula, text_of
+from .model.elements import TIME, plain
+from .model.expression import LONGEST_SUM, read_formula, read_named, text_of, with_outputs
 from .model.file import ModelFile, load
-from .model.formula import with_outputs
-from .model.goal import Goal
-from .model.goal import parse as parse_goal
 from .model.library import known
 from .model.model import name_of
-from .model.named import read_named
+from .model.scene import Goal
+from .model.scene import parse as parse_goal
 from .model.spline import SplineBase
-from .model.symbols import plain
 from .model.units import (
     ENERGY,
     METRE,

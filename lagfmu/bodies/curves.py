@@ -16,9 +16,8 @@ import sympy as sp
 from sympy.physics.vector import dynamicsymbols
 
 from ..model.elements import TIME, Expr, Friction, Nonholonomic
-from ..model.norms import norm
 from ..model.picture import Track
-from ..model.reactions import multiplier
+from ..model.reactions import multiplier, norm
 from ..model.spline import Spline
 from .body import Marker, Number
 from .draft import Curve, Draft

@@ -20,8 +20,7 @@ import sympy as sp
 
 from ..model.elements import Expr, Friction, Holonomic, Nonholonomic, Parameter
 from ..model.model import Model
-from ..model.norms import norm
-from ..model.reactions import multiplier
+from ..model.reactions import multiplier, norm
 from .body import Marker, Number, several
 from .draft import Draft, Relative, Wrench
 from .guess import Guess, Reach

@@ -1,4 +1,4 @@
-"""What acts on each body of a mechanism, in what its FMU tells (model/laws.py)."""
+"""What acts on each body of a mechanism, in what its FMU tells (model/closed_form.py)."""
 
 from __future__ import annotations
 
@@ -10,9 +10,8 @@ import sympy as sp
 
 from .. import names
 from ..model.attitude import written_out
-from ..model.closed_form import in_variables, output
+from ..model.closed_form import GROUND, Act, Laws, Where, in_variables, output
 from ..model.elements import Expr, Parameter
-from ..model.laws import GROUND, Act, Laws, Where
 from .body import Body
 from .draft import Draft, Relative
 from .joints import Gear

@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from sympy.core.function import AppliedUndef
 
-from ..model.alike import Pattern, Place, pattern
-from ..model.closing import Closing, computed
+from ..model.attitude import Closing, Pattern, Place, computed, pattern
 from ..model.differential import Differential
 from ..model.elements import TIME, Constraint, Expr, Nonholonomic, Tie
 from ..model.model import Model

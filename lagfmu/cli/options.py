@@ -218,8 +218,8 @@ def once(pairs: Iterable[tuple[str, Any]]) -> dict[str, Any]:
 
 def loaded(path: Path, added: Names, arguments: Names = None) -> ModelFile:
     """A model file, with further outputs; of a family the one of these arguments."""
+    from ..model.expression import with_outputs
     from ..model.file import load
-    from ..model.formula import with_outputs
 
     file = load(path, arguments or ())
     return replace(file, model=with_outputs(file.model, added or []))
@@ -240,7 +240,7 @@ def narrowed(scenes: Sequence[Scene], needs: Needs) -> list[Scene]:
 
     Raises UsageError if one name is given to several, and RequestError for a scene that cannot be.
     """
-    from ..model.selection import listed
+    from ..model.scene import listed
 
     name = needs.get("name")
     if name is not None and len(scenes) > 1:

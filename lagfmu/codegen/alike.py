@@ -1,7 +1,7 @@
 """What is alike up to the names of its symbols is computed by one function: bodies and joints of a kind.
 
 The values of one owner (a joint A with the rows A.x, A.y, ...; a body) are written in symbols that are
-numbered by their places in the arguments, with vectors that are fixed on bodies as data (model/alike.py).
+numbered by their places in the arguments, with vectors that are fixed on bodies as data (model/attitude.py).
 Owners whose values are then the same expressions share a function, which is called in a loop over tables of
 places and data.  Expressions are so eliminated and printed once a kind, and code grows by a line of table
 for each further joint.
@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 from itertools import groupby
 from typing import Any
 
-from ..model.alike import pattern
+from ..model.attitude import pattern
 from ..model.elements import Expr
 from ..names import read
 from .parts import Arguments, Value

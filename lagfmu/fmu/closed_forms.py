@@ -1,6 +1,6 @@
 """Closed forms as they travel inside an FMU: text that SymPy reads back.
 
-The laws of a mechanism's bodies (model/laws.py) travel likewise.
+The laws of a mechanism's bodies (model/closed_form.py) travel likewise.
 """
 
 from __future__ import annotations
@@ -19,12 +19,19 @@ from .. import names
 from ..errors import ModelError, TableError, VerificationError
 from ..files import foreign, json_of
 from ..interface.variables import VariableTable
-from ..model.closed_form import ClosedForm, Conserved, in_variables, output
+from ..model.closed_form import (
+    GROUND,
+    Act,
+    ClosedForm,
+    Conserved,
+    Laws,
+    Where,
+    in_variables,
+    output,
+)
 from ..model.elements import Expr
 from ..model.expression import functions_of, read_formula, text_of
-from ..model.goal import parse
-from ..model.laws import GROUND, Act, Laws, Where
-from ..model.scene import Scene
+from ..model.scene import Scene, parse
 from ..model.spline import Spline, splines_in
 from ..names import derivative
 

@@ -18,8 +18,8 @@ from .. import names
 from ..interface.variables import Value, Variable, VariableTable
 from ..mechanics.equations import EquationsOfMotion
 from ..methods import MENU, NUMBERS
+from ..model.elements import symbols_in
 from ..model.model import name_of
-from ..model.symbols import symbols_in
 from ..names import Subject
 from ..prepare.prepare import Prepared
 from .target import Face

@@ -22,8 +22,7 @@ from ..interface.table import with_further
 from ..model.closed_form import ClosedForm, Conserved
 from ..model.file import fmu_at, in_scene
 from ..model.model import Contact, Model, Peak
-from ..model.scene import Scene
-from ..model.selection import select
+from ..model.scene import Scene, select
 from ..page import picture as pictures
 from ..page.documentation import page, with_figures
 from ..prepare.consistency import values_at_start

@@ -18,7 +18,7 @@ from ..mechanics.kinematics import start_names
 from ..model.dimensions import dimension_of
 from ..model.elements import Constraint, Expr
 from ..model.model import Contact, Nonholonomic, name_of
-from ..model.selection import select
+from ..model.scene import select
 from ..model.units import (
     ENERGY,
     ONE,

@@ -21,8 +21,7 @@ from ..mechanics.equations import EquationsOfMotion
 from ..mechanics.formulations import Form
 from ..methods import FIXED_STEP, described
 from ..model.model import name_of
-from ..model.scene import Scene
-from ..model.selection import listed, select
+from ..model.scene import Scene, listed, select
 from ..model.units import ONE, SECOND, DisplayUnit, Unit, parse_scaled
 from ..names import Subject, derivative
 from ..numeric.system import System

@@ -21,8 +21,7 @@ from ..errors import DerivationError
 from ..model.display import Displayed
 from ..model.elements import TIME, Expr, Friction, Tie, name_of
 from ..model.model import Constraint, Model, Output, Parameter
-from ..model.norms import norm, norms_of
-from ..model.reactions import force_of_constraint, multiplier, reactions_in
+from ..model.reactions import force_of_constraint, multiplier, norm, norms_of, reactions_in
 from ..model.speeds import quaternions
 from ..model.spline import Spline, SplineBase
 from ..model.units import Unit

@@ -30,8 +30,7 @@ import sympy as sp
 from sympy.polys.matrices import DomainMatrix
 from sympy.polys.matrices.exceptions import DMNonInvertibleMatrixError
 
-from ..model.alike import pattern
-from ..model.attitude import Attitude, Carried, ClosedFunction, quaternion_rates
+from ..model.attitude import Attitude, Carried, ClosedFunction, pattern, quaternion_rates
 from ..model.differential import Differential
 from ..model.elements import Expr, Output, Tie
 from ..model.model import Model

@@ -21,8 +21,7 @@ from ..errors import RequestError, UnitError
 from ..model.elements import TIME, Expr
 from ..model.model import Constraint, Contact, Holonomic, Model, Output, Parameter, name_of
 from ..model.rule import Rule
-from ..model.scene import Scene
-from ..model.selection import select
+from ..model.scene import Scene, select
 from ..model.units import Unit, parse_quantity
 from ..names import derivative
 from .equations import EquationsOfMotion, symbols_of

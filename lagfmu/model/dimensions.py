@@ -15,8 +15,7 @@ from sympy.functions.elementary.trigonometric import (
 
 from ..errors import UnitError
 from .attitude import Attitude, Carried
-from .elements import TIME, Expr
-from .symbols import plain
+from .elements import TIME, Expr, plain
 from .units import ONE, SECOND, Unit, fraction, in_words, without_rad
 
 # Functions of a dimensionless argument, and those that keep the dimension of their arguments.

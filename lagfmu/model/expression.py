@@ -5,22 +5,39 @@ the text is parsed to a syntax tree (`ast.parse`, which runs nothing), and a Sym
 from the kinds of node in the whitelist below.  Everything else is refused by name.  A short text can still
 ask for endless work (9**9**9), so the sizes are limited: of the text, of the tree, of exact numbers, and
 what holds no symbol must be a finite double.
+
+A formula in the names of an FMU's variables:  lambda.rod - m*g*cos(theta), der(x,2), 'my mass'
+
+Any name may stand in quotes; plain, dotted ones with indices and der(...), initial(...) of one need none.
+The text is read as an expression of names, numbers, + - * / ** (or ^), comparisons and functions, and is
+never executed (expression.py).
+
+An output as one writes it on a command line:  tension = -2*L*lambda.rod [N]
+
+Names are those of the FMU's variables: coordinates and parameters, der(x), der(x,2), lambda.rod, Q.x,
+time.
 """
 
 from __future__ import annotations
 
 import ast
+import difflib
 import math
 import operator
+import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
 import sympy as sp
 from sympy.printing.str import StrPrinter
 
-from .elements import Expr
+from ..errors import RequestError
+from ..names import derivative
+from .elements import TIME, Expr, Input, Output, name_of
+from .model import Model
+from .reactions import force_of_constraint, multiplier
 from .spline import HIGHEST as HIGHEST_DERIVATIVE
 from .spline import Spline
 
@@ -342,3 +359,96 @@ def _double(value: Callable[..., float], arguments: Sequence[Any]) -> float:
     if not math.isfinite(found):
         raise ValueError("a number that is not finite")
     return found
+
+
+_PART = r"[A-Za-z_]\w*(?:\[\s*\d+(?:\s*,\s*\d+)*\s*\])?"
+_PATH = rf"{_PART}(?:\.{_PART})*"
+_RATE = rf"der\(\s*{_PATH}\s*(?:,\s*\d\s*)?\)"
+NAMES = re.compile(
+    rf"'(?P<quoted>[^']+)'|\binitial\(\s*(?:{_RATE}|{_PATH})\s*\)|\b{_RATE}"
+    rf"|(?<![\w.]){_PATH}(?![\w\[]|\s*\()"
+)
+CAPITALS = re.compile(r"\b(abs|min|max)(?=\s*\()")  # SymPy's names of these begin with one
+
+
+class UnknownNameError(ValueError):
+    """A name in a formula that means nothing, with those that are near."""
+
+
+def read_named(formula: str, known: Mapping[str, Expr]) -> Expr:
+    """The expression; `known`: what each name means.  Raises ValueError with what cannot be read."""
+    meant: dict[str, Expr] = {}
+    named: list[str] = []
+
+    def stand_in(match: re.Match[str]) -> str:
+        name = match["quoted"] or re.sub(r"\s+", "", match[0])
+        if name not in known:
+            near = difflib.get_close_matches(name, known, 3, 0.5) or list(known)[:8]
+            raise UnknownNameError(
+                f"{name!r} is unknown; did you mean {', '.join(map(repr, near))}?"
+            )
+        named.append(name)
+        meant[f"x{len(meant)}"] = known[name]
+        return f"x{len(meant) - 1}"
+
+    plain = CAPITALS.sub(lambda m: m[0].capitalize(), formula.replace("^", "**"))
+    plain = NAMES.sub(stand_in, plain)
+    try:
+        return read_formula(plain, meant)
+    except ValueError as error:
+        raise ValueError(re.sub(r"\bx(\d+)\b", lambda m: _called(named, m), str(error))) from None
+
+
+def _called(named: list[str], match: re.Match[str]) -> str:
+    """The name that stood where x0, x1, ... stand."""
+    return named[int(match[1])] if int(match[1]) < len(named) else match[0]
+
+
+TEXT = re.compile(r"\s*([^=\s]+)\s*=(.*)\[([^\[\]]*)\]\s*\Z", re.S)
+EXAMPLE = "'tension = -2*L*lambda.rod [N]'"
+
+
+def with_outputs(model: Model, texts: Sequence[str]) -> Model:
+    """The model with the outputs that the texts describe.  Raises RequestError with every problem."""
+    problems: list[str] = []
+    added = [_output(text, model, problems) for text in texts]
+    if problems:
+        raise RequestError(model.name, problems)
+    own = (*model.outputs, *(o for o in added if o is not None))
+    return replace(model, outputs=own) if texts else model
+
+
+def _output(text: str, model: Model, problems: list[str]) -> Output | None:
+    found = TEXT.match(text)
+    if found is None:
+        problems.append(f"--add-output {text!r}: expected NAME = EXPRESSION [UNIT], e.g. {EXAMPLE}")
+        return None
+    name, formula, unit = found.groups()
+    try:
+        return Output(name, read_named(formula.strip(), _known(model)), unit.strip())
+    except UnknownNameError as error:
+        problems.append(f"--add-output {text!r}: {error}")
+    except ValueError as error:
+        problems.append(f"--add-output {text!r}: {error}, expected an expression as in {EXAMPLE}")
+    return None
+
+
+def _known(model: Model) -> dict[str, Expr]:
+    """The names of the FMU's variables that an output can hold, and what they mean."""
+    known: dict[str, Expr] = {"time": TIME, "pi": sp.pi}
+    known |= {name_of(p.symbol): p.symbol for p in model.parameters}
+    for symbol in (*model.coordinates, *model.speeds, *(i.symbol for i in model.inputs)):
+        name = name_of(symbol)
+        known[name] = symbol
+        if symbol in model.speeds:
+            known[derivative(name)] = symbol.diff(TIME)
+        elif symbol in model.coordinates or _moves(model, symbol):
+            known |= {derivative(name, k): symbol.diff(TIME, k) for k in (1, 2)}
+    reactions = [multiplier(c.name) for c in model.constraints]
+    reactions += [force_of_constraint(q) for q in model.directions]
+    return known | {str(s): s for s in reactions}
+
+
+def _moves(model: Model, symbol: Expr) -> bool:
+    prescribed: tuple[Input, ...] = model.prescribed
+    return symbol in {i.symbol for i in prescribed}

@@ -1,23 +1,145 @@
-"""Loading a model file: one Model, its scenes and closed forms."""
+"""Loading a model file: one Model, its scenes and closed forms.
+
+Families of models: a file whose function `family` makes a model from arguments.
+
+    def family(n=4, length=0.25):
+        return model, scenes, closed_forms          # or the model alone
+
+Each argument has a default, which says of what type it is; `lagfmu build FILE.py -p n=8` gives another.
+"""
 
 from __future__ import annotations
 
+import ast
 import importlib
 import importlib.util
+import inspect
 import os
 import sys
 import traceback
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import ModuleType
 from typing import Any, NamedTuple
 
-from ..errors import LagfmuError, ModelError, SettingError
+import sympy as sp
+from sympy.core.function import AppliedUndef
+
+from ..errors import LagfmuError, ModelError, RequestError, SettingError
 from .closed_form import ClosedForm, Conserved
-from .family import made
+from .elements import TIME
 from .model import Model
 from .scene import Scene
-from .times import foreign_times
+
+
+def _foreign_times(text: bytes, names: Mapping[str, Any]) -> list[str]:
+    """Each X.diff(S), diff(X, S), Derivative(X, S) of the file that is 0; `names`: what its names are."""
+    found = []
+    for node in ast.walk(ast.parse(text)):
+        if not isinstance(node, ast.Call):
+            continue
+        if isinstance(node.func, ast.Attribute) and node.func.attr == "diff":
+            what, *by = node.func.value, *node.args
+        elif (
+            isinstance(node.func, ast.Name) and node.func.id in ("diff", "Derivative") and node.args
+        ):
+            what, *by = node.args
+        else:
+            continue
+        moving = names.get(what.id) if isinstance(what, ast.Name) else None
+        if not isinstance(moving, AppliedUndef) or not moving.has(TIME):
+            continue
+        for one in by:
+            other = names.get(one.id) if isinstance(one, ast.Name) else None
+            if isinstance(other, sp.Symbol) and not moving.has(other):
+                found.append(
+                    f"line {node.lineno}: {ast.unparse(node)} is 0, since the time of {moving.func} is "
+                    f"dynamicsymbols._t and {one.id} is another symbol: write {moving.func}.diff()"  # type: ignore[attr-defined]
+                )
+    return found
+
+
+FUNCTION = "family"
+HINT = f"def {FUNCTION}(n=4): ... return model, scenes, closed_forms"
+TRUE, FALSE = ("true", "yes", "1"), ("false", "no", "0")
+
+
+def _made(
+    file: str, module: ModuleType, given: Sequence[str], raised: Callable[[BaseException], str]
+) -> dict[str, Any]:
+    """What the family of a file's module makes of NAME=VALUE texts: `model`, `scenes`, `closed_forms`.
+
+    `raised` says in words what an exception of the function was.  Raises RequestError for arguments that the
+    function does not take, ModelError for what it returns or raises.
+    """
+    function = getattr(module, FUNCTION, None)
+    if not inspect.isfunction(function):
+        missing = f"-p {' -p '.join(given)}: the file has no function '{FUNCTION}', expected {HINT}"
+        raise RequestError(file, [missing])
+    arguments, problems = _arguments(inspect.signature(function), given)
+    if problems:
+        raise RequestError(file, problems)
+    try:
+        found = function(**arguments)
+    except (Exception, SystemExit) as error:
+        raise ModelError(file, [raised(error)]) from error
+    parts = found if isinstance(found, tuple) else (found,)
+    if not 1 <= len(parts) <= 3 or not isinstance(parts[0], Model):
+        expected = f"expected a Model, or {HINT.split('return ')[1]}"
+        raise ModelError(file, [f"{FUNCTION}() returns {found!r}, {expected}"])
+    return dict(zip(("model", "scenes", "closed_forms"), parts, strict=False))
+
+
+def _arguments(
+    signature: inspect.Signature, given: Sequence[str]
+) -> tuple[dict[str, Any], list[str]]:
+    known = signature.parameters
+    problems = [
+        f"{FUNCTION}({signature_text}): the argument {name!r} has no default, expected one: {HINT}"
+        for signature_text in (_told(signature),)
+        for name, one in known.items()
+        if one.default is inspect.Parameter.empty
+    ]
+    values: dict[str, Any] = {}
+    for text in given:
+        name, equals, value = (part.strip() for part in text.partition("="))
+        if not equals:
+            problems.append(f"-p {text}: expected NAME=VALUE, e.g. -p n=8")
+        elif name not in known:
+            problems.append(
+                f"-p {text}: {FUNCTION} has no argument {name!r}, only {_told(signature) or 'none'}"
+            )
+        elif name in values:
+            problems.append(f"-p {text}: {name!r} is given twice")
+        elif known[name].default is not inspect.Parameter.empty:
+            try:
+                values[name] = _read(value, known[name].default)
+            except ValueError:
+                default = known[name].default
+                problems.append(
+                    f"-p {text}: expected {_kind(default)} as the default {default!r} is, got {value!r}"
+                )
+    return values, problems
+
+
+def _told(signature: inspect.Signature) -> str:
+    return ", ".join(str(p) for p in signature.parameters.values())
+
+
+def _kind(default: Any) -> str:
+    kinds = {bool: "true or false", int: "an integer", float: "a number"}
+    return kinds.get(type(default), "text")
+
+
+def _read(value: str, default: Any) -> Any:
+    """The text as a value of the default's type; ValueError if it is none."""
+    if isinstance(default, bool):
+        if value.lower() not in TRUE + FALSE:
+            raise ValueError(value)
+        return value.lower() in TRUE
+    return type(default)(value) if isinstance(default, int | float) else value
+
 
 # Files that are a model by themselves, by their ending: the module whose read(path, arguments) makes a Model,
 # and whose PYTHON is the file that `new` writes of it.
@@ -88,7 +210,7 @@ def fmu_at(source: Model | str | os.PathLike[str], scene: Scene | str | None = N
 
 def load(path: str | os.PathLike[str], arguments: Sequence[str] = ()) -> ModelFile:
     """Run a model file and take its model; with `arguments`, NAME=VALUE, that which its function `family`
-    makes of them (family.py).  A file of another kind is read by its reader, and nothing in it is run.
+    makes of them.  A file of another kind is read by its reader, and nothing in it is run.
 
     Raises ModelError if the file is missing, raises, or does not define exactly one Model.
     """
@@ -119,11 +241,11 @@ def load(path: str | os.PathLike[str], arguments: Sequence[str] = ()) -> ModelFi
         raise ModelError(str(file), [_where(error, file.absolute())]) from error
     finally:
         sys.path.remove(folder)
-    wrong = foreign_times(file.read_bytes(), vars(module))
+    wrong = _foreign_times(file.read_bytes(), vars(module))
     if wrong:
         raise ModelError(str(file), wrong)
     if arguments:
-        found = made(str(file), module, arguments, lambda error: _where(error, file.absolute()))
+        found = _made(str(file), module, arguments, lambda error: _where(error, file.absolute()))
         return _taken(file, found["model"], found)
     models = {id(v): (k, v) for k, v in vars(module).items() if isinstance(v, Model)}
     if len(models) != 1:

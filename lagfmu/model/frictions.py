@@ -1,7 +1,7 @@
 """What is wrong with the frictions of a model, in words.
 
 A friction limits the multipliers of one or two constraints, forces or one torque, by a normal force that is
-linear in multipliers of other constraints, or a sum of norms of such (norms.py); or by a limit of their own.
+linear in multipliers of other constraints, or a sum of norms of such (reactions.py); or by a limit of their own.
 """
 
 from __future__ import annotations
@@ -13,10 +13,18 @@ import sympy as sp
 
 from ..errors import UnitError
 from .dimensions import check_dimension, dimension_of
-from .elements import NAME, TIME, Contact, Expr, Friction, ModelFields, Nonholonomic
-from .norms import norms_of
-from .reactions import multiplier, reactions_in
-from .symbols import plain, undeclared
+from .elements import (
+    NAME,
+    TIME,
+    Contact,
+    Expr,
+    Friction,
+    ModelFields,
+    Nonholonomic,
+    plain,
+    undeclared,
+)
+from .reactions import multiplier, norms_of, reactions_in
 from .units import ONE, Unit, parse_unit
 
 MOST_ROWS = 2  # tangential directions of a surface

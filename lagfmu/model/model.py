@@ -4,20 +4,32 @@ Two forms are accepted (the lectures' two): a Lagrangian L = T - V with non-cons
 forces Q_nc (ME 6590 eq. 3), or the kinetic energy K with all generalized forces F_q (eq. 2).
 
 Everything that is wrong with a model (`check.py`) is reported at once, in one ModelError.
+
+Numbers given in g, mm, deg or rpm, in coherent SI: what a Model keeps.
+
+The equations know coherent SI alone.  A unit that is a multiple of one belongs to the numbers beside it:
+value and bounds of a parameter, start and rate of an input, the start of a coordinate and of its velocity,
+what an output is otherwise.  An expression carries its own dimension.  Importers are told of the unit as the
+one in which the variable is shown.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import cached_property
+from typing import Any, TypeVar
 
-from ..errors import ModelError
+import sympy as sp
+from sympy.core.function import AppliedUndef
+
+from ..errors import ModelError, UnitError
 from .check import declared_units, problems_of, splines_of
 from .display import Displayed
 from .elements import (
     NAME,
+    TIME,
     Constraint,
     Contact,
     Embedding,
@@ -30,13 +42,78 @@ from .elements import (
     Output,
     Parameter,
     Peak,
+    is_number,
     name_of,
 )
 from .frictions import split
 from .kinds import check_containers
-from .scaled import in_si
+from .reactions import multiplier
+from .scene import select
 from .spline import Spline
-from .units import Unit
+from .units import DisplayUnit, Unit, parse_scaled
+
+
+def _in_si(model: ModelFields) -> dict[str, Any]:
+    """The fields of a model that are others in coherent SI, `display_units` among them.
+
+    What cannot be read stays as it is, for `check.py` to tell.
+    """
+    shown: dict[str, str] = dict(model.display_units)
+    numbers = {
+        "parameters": ("value", "min", "max"),
+        "inputs": ("start", "rate"),
+        "outputs": ("otherwise",),
+    }
+    found: dict[str, Any] = {
+        name: tuple(_taken(one, of, shown) for one in getattr(model, name))
+        for name, of in numbers.items()
+    }
+    found["coordinates"], found["start"] = _motion(model.coordinates, model.start, shown)
+    found["speeds"], found["start"] = _motion(model.speeds, found["start"], shown)
+    if model.embedding is not None:
+        coordinates, start = _motion(model.embedding.coordinates, model.embedding.start, shown)
+        found["embedding"] = replace(model.embedding, coordinates=coordinates, start=start)
+    return {**found, "display_units": shown}
+
+
+def _scaled(text: object) -> DisplayUnit | None:
+    """A unit that is a multiple of a coherent one; None for any other text."""
+    try:
+        read = parse_scaled(text, "a value")  # type: ignore[arg-type]
+    except UnitError:
+        return None
+    return None if read.coherent else read
+
+
+def _taken(one: Any, numbers: tuple[str, ...], shown: dict[str, str]) -> Any:
+    """A parameter, input or output in coherent SI; `numbers`: its fields that are in its unit."""
+    if not isinstance(one, Parameter | Input | Output):
+        return one
+    unit = _scaled(one.unit)
+    if unit is None:
+        return one
+    shown[one.name if isinstance(one, Output) else name_of(one.symbol)] = unit.name
+    given = {k: getattr(one, k) for k in numbers}
+    si: dict[str, Any] = {k: unit.to_si(float(x)) for k, x in given.items() if is_number(x)}
+    return replace(one, unit=unit.unit.name, **si)
+
+
+def _motion(
+    coordinates: Mapping[Expr, str], start: Mapping[Expr, Any], shown: dict[str, str]
+) -> tuple[dict[Expr, str], dict[Expr, Any]]:
+    """Coordinates with their units, and start values, in coherent SI."""
+    units, values = dict(coordinates), dict(start)
+    for q, text in coordinates.items():
+        unit = _scaled(text)
+        if unit is None or not isinstance(q, AppliedUndef):
+            continue
+        units[q] = unit.unit.name
+        shown[name_of(q)] = unit.name
+        for state in (q, q.diff(TIME)):
+            if state in values and is_number(values[state]):
+                values[state] = unit.to_si(float(values[state]))
+    return units, values
+
 
 __all__ = [
     "NAME",
@@ -96,7 +173,7 @@ class Model(ModelFields, Displayed):
         own = tuple(o for o in self.outputs if not isinstance(o, Peak))
         object.__setattr__(self, "outputs", own)
         object.__setattr__(self, "peaks", tuple(dict.fromkeys((*self.peaks, *peaks))))
-        for name, value in in_si(self).items():
+        for name, value in _in_si(self).items():
             object.__setattr__(self, name, value)
         problems = problems_of(self)
         if problems:
@@ -135,3 +212,65 @@ class Model(ModelFields, Displayed):
     def constraint(self, name: str) -> Constraint:
         """The constraint called `name`; KeyError if there is none."""
         return next(c for c in self.constraints if c.name == name)
+
+
+Fields = TypeVar("Fields", bound=ModelFields)
+
+
+def stuck(model: Fields, slipping: Sequence[str], problems: list[str]) -> Fields:
+    """The model in which only the frictions `slipping` (names or patterns) may slip.
+
+    What the others limit holds always, or while the one contact of its normal force is closed; parameters
+    that stand in those frictions alone go with them.
+    """
+    may = select(slipping, [f.name for f in model.frictions], "friction", problems)
+    gone = [f for f in model.frictions if f.name not in may]
+    if not gone:
+        return model
+    gates: dict[str, str] = {}
+    contacts = {multiplier(c.name): c.name for c in model.constraints if isinstance(c, Contact)}
+    for f in gone:
+        normal = sp.sympify(f.normal)
+        normals = [name for symbol, name in contacts.items() if normal.has(symbol)]
+        gates |= {name: normals[0] for name in f.of if normals}
+        rough = [name for name in f.of if not isinstance(_row(model, name), Nonholonomic)]
+        if len(normals) > 1 or (normals and rough):
+            problems.append(
+                f"the friction {f.name!r} shall not slip, but {', '.join(map(repr, f.of))} acts with "
+                f"{' and '.join(map(repr, normals))}: that can be said of a Nonholonomic constraint and "
+                f"one contact alone (while_closed); name it in `frictions`"
+            )
+    if problems:
+        return model
+    kept = tuple(f for f in model.frictions if f.name in may)
+    rest = {f.name: getattr(model, f.name) for f in fields(model)} | {"frictions": kept}
+    used = _symbols([v for name, v in rest.items() if name != "parameters"])
+    idle = _symbols(gone) - used
+    return replace(
+        model,
+        frictions=kept,
+        constraints=tuple(
+            replace(c, while_closed=gates[c.name])
+            if c.name in gates and isinstance(c, Nonholonomic)
+            else c
+            for c in model.constraints
+        ),
+        parameters=tuple(p for p in model.parameters if p.symbol not in idle),
+    )
+
+
+def _row(model: ModelFields, name: str) -> object:
+    return next(c for c in model.constraints if c.name == name)
+
+
+def _symbols(x: Any) -> set[Expr]:
+    """The symbols in everything that a model holds."""
+    if isinstance(x, sp.Basic):
+        return set(x.free_symbols)
+    if isinstance(x, Mapping):
+        return _symbols([*x.keys(), *x.values()])
+    if is_dataclass(x) and not isinstance(x, type):
+        return _symbols([getattr(x, f.name) for f in fields(x)])
+    if isinstance(x, list | tuple):
+        return set().union(*map(_symbols, x)) if x else set()
+    return set()

@@ -2,19 +2,22 @@
 
 A point is (x, y), to the right and up, or (x, y, z) with z up; all points of a picture have as many
 coordinates.  A shape may also hold velocities, inputs and `output(name)` of whatever the FMU reports.
+
+What the live page of a model shows at first: the sliders that matter, the curves that tell, the ranges.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import sympy as sp
 
 from .attitude import rotation_matrix
-from .elements import Expr
+from .closed_form import variable_name
+from .elements import Expr, ModelFields, is_number, known_symbols, name_of, symbols_in
 
 Point = tuple[Expr, ...]
 
@@ -95,7 +98,7 @@ class Box:
     @property
     def axes(self) -> list[Point]:
         """Unit vectors along its sides."""
-        return axes_of(len(self.center), self.rotation)
+        return _axes_of(len(self.center), self.rotation)
 
 
 @dataclass(frozen=True)
@@ -108,10 +111,10 @@ class Frame:
     @property
     def axes(self) -> list[Point]:
         """Unit vectors along them."""
-        return axes_of(len(self.at), self.rotation)
+        return _axes_of(len(self.at), self.rotation)
 
 
-def axes_of(dimensions: int, rotation: Any) -> list[Point]:
+def _axes_of(dimensions: int, rotation: Any) -> list[Point]:
     """The columns of a rotation that is an angle [rad] in the plane; in space a matrix or a quaternion."""
     if dimensions == 2:
         angle = sp.sympify(rotation or 0)
@@ -230,7 +233,7 @@ def points_of(shape: Shape) -> list[Point]:
     return [p for p in found if p is not None]
 
 
-def expressions_of(shape: Shape) -> Iterator[Expr]:
+def _expressions_of(shape: Shape) -> Iterator[Expr]:
     """Every expression of a shape."""
     for point in points_of(shape):
         yield from (sp.sympify(x) for x in point)
@@ -241,3 +244,151 @@ def expressions_of(shape: Shape) -> Iterator[Expr]:
         yield from (sp.sympify(x) for axis in shape.axes for x in axis)
     if isinstance(shape, Track):
         yield from (sp.sympify(x) for x in (shape.first, shape.last))
+
+
+def check_picture(model: ModelFields, problems: list[str]) -> None:
+    """Add what is wrong with it to `problems`."""
+    extra = model.embedding.coordinates if model.embedding else {}
+    known, own = known_symbols(model) | set(extra), {o.name for o in model.outputs}
+    sizes = set()
+    for number, shape in enumerate(model.picture, 1):
+        what = f"picture, shape {number}"
+        if not isinstance(shape, SHAPES):
+            kinds = ", ".join(s.__name__ for s in SHAPES)
+            problems.append(f"{what} is {shape!r}, expected one of {kinds}")
+            continue
+        what += f" ({type(shape).__name__})"
+        wrong = [p for p in points_of(shape) if not _is_point(p)]
+        problems += [
+            f"{what}: {p!r} is no point, expected (x, y) or (x, y, z), each a number or a SymPy expression"
+            for p in wrong
+        ]
+        if wrong:
+            continue
+        sizes |= {len(p) for p in points_of(shape)}
+        if isinstance(shape, Line) and len(shape.points) < 2:
+            problems.append(f"{what}: {len(shape.points)} points, expected two or more")
+        if isinstance(shape, Line) and shape.length is not None and len(shape.points) > 2:
+            problems.append(
+                f"{what}: {len(shape.points)} points and a length, expected two: what hangs slack is a "
+                "string between two points"
+            )
+        if isinstance(shape, Arrow):
+            _check_arrow(model, shape, what, problems)
+        if isinstance(shape, Box | Frame) and not _is_rotation(shape):
+            problems.append(
+                f"{what}: its rotation is {shape.rotation!r}, expected an angle in the plane; in space a "
+                "matrix of 3 rows whose columns are its axes, or a unit quaternion (w, x, y, z)"
+            )
+            continue
+        if isinstance(shape, Pivot) and shape.kind not in PIVOTS:
+            problems.append(
+                f"{what}: its kind is {shape.kind!r}, expected one of {', '.join(PIVOTS)}"
+            )
+        problems += [
+            f"{what}: {name} is neither coordinate, parameter nor input: declare it, or use output(name)"
+            for name in sorted(set(_unknown(known, own, shape)))
+        ]
+    if len(sizes) > 1:
+        problems.append(
+            "the picture has points in the plane and in space: write all with as many coordinates"
+        )
+
+
+def _is_point(point: object) -> bool:
+    return (
+        isinstance(point, tuple | list)
+        and len(point) in (2, 3)
+        and all(
+            isinstance(sp.sympify(x, strict=False), sp.Expr) and not isinstance(x, str)
+            for x in point
+        )
+    )
+
+
+def _is_rotation(shape: Box | Frame) -> bool:
+    try:
+        return all(map(_is_point, shape.axes)) and len(set(map(len, points_of(shape)))) == 1
+    except (TypeError, ValueError, sp.SympifyError):
+        return False
+
+
+def _check_arrow(model: ModelFields, arrow: Arrow, what: str, problems: list[str]) -> None:
+    if arrow.force is not None:
+        return
+    known = [c.name for c in model.constraints if hasattr(c, "expression")]
+    if arrow.constraint not in known:
+        problems.append(
+            f"{what}: no constraint is called {arrow.constraint!r}, expected one of "
+            f"{', '.join(known) or 'none: the model has no constraint'}"
+        )
+
+
+def _unknown(known: set[Expr], own: set[str], shape: Shape) -> Iterator[str]:
+    """Names that are none of the model's symbols, nor of its outputs; those with a dot are outputs too."""
+    over = {shape.over} if isinstance(shape, Track) else set()
+    for expression in _expressions_of(shape):
+        for symbol in symbols_in(expression) - known - over:
+            if "." not in str(symbol) and str(symbol) not in own:
+                yield name_of(symbol)
+
+
+Named = str | Expr  # a variable by its name in the FMU, or what a model has for it
+
+
+@dataclass(frozen=True)
+class Page:
+    """What the live page shows at first; everything else is there, folded away.
+
+    `sliders` are parameters, inputs and start values, in this order; `curves` outputs of the FMU, the
+    first of them beside the picture; `ranges` the lowest and highest value [SI] of a slider.  Variables are
+    named as in the FMU ("lambda.surface", "der(theta)"), or as in the model (theta, theta.diff(), m).
+    """
+
+    sliders: Sequence[Named] = ()
+    curves: Sequence[Named] = ()
+    ranges: Mapping[Named, tuple[float, float]] = field(default_factory=dict)
+
+
+def told(variable: Named) -> str:
+    """Its name in the FMU."""
+    return variable if isinstance(variable, str) else variable_name(variable)
+
+
+def check_page(model: ModelFields, problems: list[str]) -> None:
+    """What is wrong with the page of a model, but for names: those are known when its FMU is."""
+    page: Any = model.page
+    if page is None:
+        return
+    if not isinstance(page, Page):
+        problems.append(f"page = {page!r}, expected Page(sliders=[...], curves=[...], ranges=...)")
+        return
+    for what in ("sliders", "curves", "ranges"):
+        given, kind = getattr(page, what), Mapping if what == "ranges" else Sequence
+        if isinstance(given, str) or not isinstance(given, kind):
+            expected = "{m: (0.5, 2)}" if what == "ranges" else "[m, 'lambda.wire']"
+            problems.append(f"page: {what} = {given!r}, expected e.g. {what}={expected}")
+            continue
+        problems += [
+            f"page: {what} hold {v!r}, expected the name of a variable, or a symbol of the model"
+            for v in given
+            if not isinstance(v, str | sp.Symbol | sp.Function | sp.Derivative)
+        ]
+    if not isinstance(page.ranges, Mapping):
+        return
+    values = {name_of(p.symbol): p for p in model.parameters}
+    for variable, ends in page.ranges.items():
+        what = f"page: the range of {told(variable)}"
+        if not isinstance(ends, tuple | list) or len(ends) != 2 or not all(map(is_number, ends)):
+            problems.append(f"{what} is {ends!r}, expected two numbers (low, high)")
+            continue
+        low, high = ends
+        if not low < high:
+            problems.append(f"{what} is {ends!r}, expected the lower number first")
+        p = values.get(told(variable))
+        if p is None:
+            continue
+        if (p.min is not None and low < p.min) or (p.max is not None and high > p.max):
+            problems.append(f"{what} is {ends!r}, beyond its bounds [{p.min}, {p.max}]")
+        if not low <= float(p.value) <= high:
+            problems.append(f"{what} is {ends!r} without its own value {p.value}")

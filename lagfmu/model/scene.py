@@ -2,18 +2,125 @@
 
 `outputs`, `fixed`, `inputs`, `contacts` and `frictions` name what an importer reads, changes and drives, and
 what may open and slip; mechanics/prune.py removes everything else before code is printed.
+
+The accuracy that is asked for: 1e-6, 1e-6:lambda.surface, 1e-6:lambda.surface,Q.*
 """
 
 from __future__ import annotations
 
+import difflib
+import fnmatch
 import keyword
-from collections.abc import Sequence
+import re
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
 
-from ..errors import RequestError
+from ..errors import RequestError, UsageError
 from ..methods import AUTO, DIFFERENTIATED, EXPLICIT, METHODS, UNLESS_STIFF, integrators, unknown
 from ..numeric.tolerance import DEFAULT_TOLERANCE, tolerance_problem
 from .elements import NAME, is_number
+
+
+def select(
+    wanted: Iterable[str], known: Sequence[str], what: str, problems: list[str]
+) -> tuple[str, ...]:
+    """Those of `known`, in their order, that a name or pattern (* and ?) of `wanted` means.
+
+    A name that means nothing is added to `problems`; `what` says what it should be, e.g. 'parameter'.
+    """
+    found: set[str] = set()
+    for name in wanted:
+        meant = [k for k in known if k == name or fnmatchcase(k, name)]
+        found.update(meant)
+        if not meant and name != "*":
+            near = difflib.get_close_matches(name, known, 3, 0.5) or list(known[:8])
+            hint = f"; did you mean {', '.join(map(repr, near))}?" if near else "; there is none"
+            problems.append(f"{what} {name!r} is unknown{hint}")
+    return tuple(k for k in known if k in found)
+
+
+def listed(text: str) -> tuple[str, ...]:
+    """NAME,NAME as names; a comma within parentheses belongs to the name, as in der(x,2)."""
+    found: list[str] = []
+    depth, word = 0, ""
+    for letter in f"{text},":
+        depth += (letter == "(") - (letter == ")")
+        if letter == "," and depth <= 0:
+            found.append(word.strip())
+            word = ""
+        else:
+            word += letter
+    return tuple(w for w in found if w)
+
+
+MARGIN = 5.0  # the choice is this much better on the scene than what was asked
+HELD_OUT_MARGIN = 2.0  # and still this much on other start values and parameters
+LOOSEST, FINEST = 0.1, 1e-12
+GROUPS = {  # of quantities that an accuracy is asked of
+    "lambda": r"lambda\.[\w.]+",
+    "Q": r"Q\.\w+(\.\w+\.\w+)?",
+    "coordinates": r"(\w+\.(position|orientation)\.)?[A-Za-z_]\w*",
+    "event time": r"departure\.[\w.]+\.time",
+}
+USUAL = 10.0  # times the tolerance that a closed form may miss, unless it says otherwise
+
+
+def _is(variable: str, name: str) -> bool:
+    """Whether a variable is meant by a name, a pattern (Q.*) or a group."""
+    group = GROUPS.get(name)
+    if group is not None and re.fullmatch(group, variable):
+        return True
+    return fnmatch.fnmatchcase(variable, name)
+
+
+@dataclass(frozen=True)
+class Goal:
+    """A relative error, and the quantities that it is asked of (all measured ones if empty)."""
+
+    accuracy: float
+    names: tuple[str, ...] = ()
+
+    @property
+    def on_the_scene(self) -> float:
+        """The error that a setting may have where it is chosen."""
+        return self.accuracy / MARGIN
+
+    @property
+    def held_out(self) -> float:
+        """The error that it may have elsewhere."""
+        return self.accuracy / HELD_OUT_MARGIN
+
+    def allowed(self, symbols: Collection[str], within: float) -> float | None:
+        """What a statement about these variables may miss, relative to its scale; None: not asked.
+
+        A measured quantity is held to the accuracy itself.  An expression of such, which loosens them
+        by its terms, is when it is allowed `within` / USUAL of what is usual.
+        """
+        if self.names and not all(any(_is(s, n) for n in self.names) for s in symbols):
+            return None
+        measured = len(symbols) == 1 and any(_is(s, group) for s in symbols for group in GROUPS)
+        return self.accuracy if measured else self.accuracy * max(1.0, within / USUAL)
+
+    def __str__(self) -> str:
+        return f"{self.accuracy:g}" + (f" of {', '.join(self.names)}" if self.names else "")
+
+
+def parse(text: str) -> Goal:
+    """'1e-6' or '1e-6:NAME,NAME'.  Raises UsageError if it is neither."""
+    number, colon, names = text.partition(":")
+    wanted = tuple(n.strip() for n in names.split(",") if n.strip())
+    try:
+        accuracy = float(number)
+    except ValueError:
+        accuracy = float("nan")
+    if not FINEST <= accuracy <= LOOSEST or (colon and not wanted):
+        raise UsageError(
+            f"--accuracy {text!r}: expected a relative error from {FINEST:g} to {LOOSEST:g}, and after "
+            "a colon the outputs that it is asked of, e.g. 1e-6 or 1e-6:lambda.surface,Q.*"
+        )
+    return Goal(accuracy, wanted)
+
 
 FORMULATIONS = ("multipliers", "nullspace", "minimal")
 EVERYTHING = ("*",)

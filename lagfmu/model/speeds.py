@@ -15,8 +15,7 @@ from sympy.core.function import AppliedUndef
 
 from .differential import Differential
 from .dimensions import check_dimension
-from .elements import Expr, ModelFields
-from .symbols import plain
+from .elements import Expr, ModelFields, plain
 from .units import Unit
 
 

@@ -1,4 +1,4 @@
-"""Rotation matrices, and vectors that are fixed on bodies (model/closing.py): of numbers or of arrays.
+"""Rotation matrices, and vectors that are fixed on bodies (model/attitude.py): of numbers or of arrays.
 
 A matrix is a list of nine elements by rows, a vector one of three.
 """

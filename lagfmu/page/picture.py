@@ -26,7 +26,6 @@ from ..model.attitude import Attitude, ClosedFunction
 from ..model.closed_form import in_variables
 from ..model.elements import TIME, Expr
 from ..model.model import Model, Nonholonomic
-from ..model.page import told
 from ..model.picture import (
     PIVOTS,
     Arrow,
@@ -39,10 +38,10 @@ from ..model.picture import (
     Spring,
     Track,
     points_of,
+    told,
 )
 from ..model.reactions import multiplier
-from ..model.scene import EVERYTHING
-from ..model.selection import select
+from ..model.scene import EVERYTHING, select
 from ..model.spline import SplineBase
 from ..numeric.closed import rotation
 from ..numeric.cubic import Cubic

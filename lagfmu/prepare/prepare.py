@@ -16,11 +16,9 @@ from ..mechanics.equations import EquationsOfMotion
 from ..mechanics.formulations import Form
 from ..mechanics.jumps import with_jumps
 from ..methods import AUTO, UNLESS_STIFF
-from ..model.elements import Expr
-from ..model.model import Model
+from ..model.elements import Expr, unused
+from ..model.model import Model, stuck
 from ..model.scene import Scene
-from ..model.stuck import stuck
-from ..model.symbols import unused
 from .consistency import check_embedding, examined_structure
 from .reduced_start import with_reduced_start
 from .request import formulated

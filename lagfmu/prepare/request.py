@@ -12,8 +12,7 @@ from ..interface.variables import VariableTable
 from ..mechanics import prune
 from ..mechanics.equations import EquationsOfMotion
 from ..mechanics.formulations import Form, reduce
-from ..model.scene import EVERYTHING, Scene
-from ..model.selection import select
+from ..model.scene import EVERYTHING, Scene, select
 from .steps import Derived
 
 

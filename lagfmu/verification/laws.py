@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from ..fmu.closed_forms import motion_of, needed, stated
 from ..fmu.read import Trajectory
+from ..model.closed_form import GROUND, Act, Laws, Where
 from ..model.elements import Expr
-from ..model.laws import GROUND, Act, Laws, Where
 from ..numeric.closed import rotation
 from .check import Check
 from .closed_forms import evaluate, measured

@@ -4,7 +4,7 @@
     of = "lambda.rod"
     at_least = 0
 
-Formulas are read as text that is never run (model/named.py).
+Formulas are read as text that is never run (model/expression.py).
 
 A run of deviation d is right where d <= absolute + within * scale; d is of the unit of `of`, and the scale
 the largest magnitude of `of` along the run.
@@ -28,7 +28,7 @@ from ..files import content_of, foreign, toml_of
 from ..fmu.read import Trajectory, numbers_of
 from ..model.closed_form import output
 from ..model.elements import Expr
-from ..model.named import read_named
+from ..model.expression import read_named
 from ..model.rule import missing
 from .check import Against, Check
 from .closed_forms import evaluate, measured

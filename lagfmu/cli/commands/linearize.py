@@ -46,7 +46,7 @@ def linearize(
 ) -> None:
     """A, B, C, D, poles and modes in coordinates that the constraints leave free."""
     from ...fmu.read import read_description, units_of
-    from ...model.selection import listed
+    from ...model.scene import listed
     from ...page.table import print_whole
     from ...studio.linearize.linearize import linearize as found_by
     from ...studio.linearize.linearize import made_for

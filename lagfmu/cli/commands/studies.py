@@ -327,7 +327,7 @@ def sensitivity(
     """How outputs change with parameters: derivatives at the given values, or indices over ranges."""
     from ...files import write_whole
     from ...fmu.read import read_description, units_of
-    from ...model.selection import listed
+    from ...model.scene import listed
     from ...page.table import print_whole
     from ...studio.sensitivity.local import ALL, TOLERANCE, made_for
     from ...studio.sensitivity.local import sensitivity as found_by

@@ -15,8 +15,7 @@ from textwrap import wrap
 import sympy as sp
 from sympy.logic.boolalg import Boolean
 
-from ...model.attitude import ClosedFunction
-from ...model.closing import VECTOR, Closing, Step
+from ...model.attitude import VECTOR, ClosedFunction, Closing, Step
 from ...model.elements import Expr
 from ..alike import DATA, Kind, data_of, kinds, nodes_of, runs
 from ..parts import Value

@@ -18,8 +18,7 @@ import sympy as sp
 from sympy.printing.pycode import PythonCodePrinter
 
 from ...errors import DerivationError
-from ...model.attitude import ClosedFunction
-from ...model.closing import VECTOR, Closing, Step
+from ...model.attitude import VECTOR, ClosedFunction, Closing, Step
 from ...model.elements import Expr
 from ...numeric.closed import OPERATIONS
 from ..alike import DATA, Kind, data_of, kinds, runs

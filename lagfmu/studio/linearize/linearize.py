@@ -22,8 +22,7 @@ from ...fmu.write import write
 from ...interface.variables import problems_of
 from ...model.file import fmu_at, in_scene
 from ...model.model import Model
-from ...model.scene import EVERYTHING, Scene
-from ...model.selection import select
+from ...model.scene import EVERYTHING, Scene, select
 from ...prepare.prepare import prepare
 from ..live.page import render
 from ..live.play import told_by

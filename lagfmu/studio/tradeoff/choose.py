@@ -21,9 +21,8 @@ from ...fmu.read import Trajectory, joint_starts, kind_of
 from ...fmu.session import Session
 from ...fmu.write import write
 from ...methods import METHODS
-from ...model.goal import HELD_OUT_MARGIN, MARGIN, Goal
 from ...model.model import Model
-from ...model.scene import Scene
+from ...model.scene import HELD_OUT_MARGIN, MARGIN, Goal, Scene
 from ...page.documentation import template
 from ...prepare.prepare import prepare
 from ...verification.simulate import steps_of
