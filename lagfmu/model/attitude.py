@@ -8,10 +8,10 @@ computes each matrix and each vector once; `written_out` gives the polynomials.
 Expressions that are alike up to the names of their symbols, and to the vectors that are fixed on bodies.
 
 The rows of two hinges differ in which bodies they tie, and in points and directions on these.  Written in
-symbols that are numbered by their places, with the vectors of closed functions (attitude.py) as data, they
+symbols that are numbered by their places, with the vectors of closed functions as data, they
 are the same expressions: one of each kind is differentiated, printed and compiled.
 
-What is closed (attitude.py) -> steps that compute it: matrices, then vectors, each once.
+What is closed -> steps that compute it: matrices, then vectors, each once.
 
 rotation           R of e                          across             x = w x s
 rotation_change    dR of e and de                  across_change      dw x s + w x ds

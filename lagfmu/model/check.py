@@ -62,7 +62,9 @@ def _check_outputs(model: ModelFields, problems: list[str]) -> None:
             problems += _undefined(model, what, sp.sympify(o.expression))
 
 
-def _check_output_units(model: ModelFields, units: Mapping[Expr, Unit], problems: list[str]) -> None:
+def _check_output_units(
+    model: ModelFields, units: Mapping[Expr, Unit], problems: list[str]
+) -> None:
     """Each term has the dimension of the output's unit; `otherwise` may be a plain number."""
     known = {**units, **(reaction_units(model, units) if model.outputs else {})}
     for o in model.outputs:

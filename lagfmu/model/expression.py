@@ -10,7 +10,7 @@ A formula in the names of an FMU's variables:  lambda.rod - m*g*cos(theta), der(
 
 Any name may stand in quotes; plain, dotted ones with indices and der(...), initial(...) of one need none.
 The text is read as an expression of names, numbers, + - * / ** (or ^), comparisons and functions, and is
-never executed (expression.py).
+never executed.
 
 An output as one writes it on a command line:  tension = -2*L*lambda.rod [N]
 

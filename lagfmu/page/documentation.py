@@ -112,7 +112,7 @@ def page(
 ) -> str:
     """The HTML page of an FMU.
 
-    `choice` is the section on how its solver settings were chosen, in HTML (studio/tradeoff/choose.py).  `live`:
+    `choice` is the section on how its solver settings were chosen, in HTML (tradeoff/choose.py).  `live`:
     the page in which the FMU runs stands beside it.
     """
     model, structure, table = prepared.model, prepared.structure, prepared.table
