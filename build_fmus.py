@@ -38,7 +38,8 @@ from lagfmu.fmu.native import takes_long
 from lagfmu.fmu.python import refusals
 from lagfmu.fmu.target import NATIVE, PYTHON, TARGETS, USUAL, Face, missing_for_native
 from lagfmu.model.file import load
-from lagfmu.prepare.prepare import Prepared, prepare
+from lagfmu.prepare.prepare import prepare
+from lagfmu.prepare.steps import Prepared
 
 MODELS = Path(__file__).parent / "models"
 RUNS = 3  # the time is the median of these

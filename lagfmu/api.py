@@ -25,7 +25,8 @@ from .page.documentation import html
 from .page.table import printed
 from .page.text import show as show_prepared
 from .page.text import show_besides
-from .prepare.prepare import Prepared, prepare
+from .prepare.prepare import prepare
+from .prepare.steps import Prepared
 from .verification.check import Verification
 from .verification.crosscheck import layered
 from .verification.verify import verify

@@ -98,8 +98,9 @@ from .page.text import show as show_in
 from .page.text import wrapped
 from .page.typeset import typeset
 from .prepare.consistency import RedundantConstraintWarning
-from .prepare.prepare import Prepared, prepare
+from .prepare.prepare import prepare
 from .prepare.starts import StartMovedWarning
+from .prepare.steps import Prepared
 from .studio import film
 from .studio.fit import solve as fit_solve
 from .studio.live import play as live_play

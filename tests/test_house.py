@@ -196,7 +196,7 @@ def test_a_method_is_one_file(method: str) -> None:
         ("the integration stops at", "runtime/ode/refused_step.c"),
         ("makes no headway", "runtime/ode/refused_step.c"),
         ("#c2410c", "studio/live/web/page.css"),
-        ("DEFAULT_TOLERANCE = 1e-8", "numeric/tolerance.py"),
+        ("DEFAULT_TOLERANCE = 1e-8", "numeric/thresholds.py"),
         ("PROJECTION_SMALL =", "runtime/base/thresholds.h"),
     ],
 )

@@ -26,7 +26,7 @@ from ..fmu.write import write
 from ..methods import INTEGRATORS, unknown
 from ..model.file import ModelFile, is_model, load
 from ..model.scene import Scene
-from ..numeric.tolerance import tolerance_problem
+from ..numeric.thresholds import tolerance_problem
 from ..page.table import print_whole
 from ..prepare.prepare import prepare
 from ..studio.host import DiedError, Host, LateError

@@ -23,7 +23,7 @@ from ..mechanics.equations import FrictionLaw
 from ..mechanics.formulations import Form, sharing_inertia
 from ..model.model import Contact
 from ..prepare.consistency import posed
-from ..prepare.prepare import Prepared
+from ..prepare.steps import Prepared
 from .described import Unknown, as_text, offers_exchange, structure_of
 
 

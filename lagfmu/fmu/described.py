@@ -21,7 +21,7 @@ from ..methods import MENU, NUMBERS
 from ..model.elements import symbols_in
 from ..model.model import name_of
 from ..names import Subject
-from ..prepare.prepare import Prepared
+from ..prepare.steps import Prepared
 from .target import Face
 
 COMMON: Mapping[int, Mapping[str, str]] = {  # by version of FMI

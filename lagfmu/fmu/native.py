@@ -18,7 +18,7 @@ from ..codegen.c.interface import (
 )
 from ..errors import BuildError, CannotStartError
 from ..methods import SEPARABLE
-from ..prepare.prepare import Prepared
+from ..prepare.steps import Prepared
 from .archive import BUNDLE, bundled, linked, pack, reached, tool
 from .compiler import HOST, Platform, chosen, compile_libraries, host, is_first
 from .described import interfaces_of, untold

@@ -21,8 +21,8 @@ from ..errors import BuildError
 from ..interface.variables import Variable, VariableTable, rules_of
 from ..mechanics.kinematics import start_names
 from ..methods import IN_PYTHON, NUMBERS
-from ..numeric.closed import OPERATIONS
-from ..prepare.prepare import Prepared
+from ..numeric.functions import OPERATIONS
+from ..prepare.steps import Prepared
 from .archive import pack, version
 from .binary import Hear
 from .description import model_description

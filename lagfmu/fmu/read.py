@@ -24,7 +24,7 @@ from ..files import content_of, foreign, xml_of
 from ..interface.variables import problems_of
 from ..model.rule import Rule, missing
 from ..names import rate_of
-from ..numeric.tolerance import DEFAULT_TOLERANCE
+from ..numeric.thresholds import DEFAULT_TOLERANCE
 from .archive import LARGEST_TEXT, entry, opened, platforms
 from .target import NATIVE, PYTHON
 

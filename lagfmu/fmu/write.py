@@ -26,8 +26,9 @@ from ..model.scene import Scene, select
 from ..page import picture as pictures
 from ..page.documentation import page, with_figures
 from ..prepare.consistency import values_at_start
-from ..prepare.prepare import Prepared, prepare
+from ..prepare.prepare import prepare
 from ..prepare.starts import check_given, tell
+from ..prepare.steps import Prepared
 from . import native, python
 from .archive import pack
 from .closed_forms import pack_closed_forms

@@ -25,8 +25,7 @@ from ..model.scene import Scene, listed, select
 from ..model.units import ONE, SECOND, DisplayUnit, Unit, parse_scaled
 from ..names import Subject, derivative
 from ..numeric.system import System
-from ..numeric.thresholds import LARGEST_TOLERANCE
-from ..numeric.tolerance import MAXIMUM_STEPS
+from ..numeric.thresholds import LARGEST_TOLERANCE, MAXIMUM_STEPS
 from .dependencies import Dependencies
 from .outputs import Outputs
 from .variables import Value, Variable, VariableTable

@@ -29,7 +29,7 @@ from typing import Any
 
 import sympy as sp
 
-from ..numeric.closed import OPERATIONS, across, rotation
+from ..numeric.functions import OPERATIONS, across, rotation
 from .elements import Expr
 
 Change = Callable[[Expr], Expr]

@@ -1,7 +1,7 @@
 """What is wrong with the frictions of a model, in words.
 
 A friction limits the multipliers of one or two constraints, forces or one torque, by a normal force that is
-linear in multipliers of other constraints, or a sum of norms of such (reactions.py), or by a limit of its own.
+linear in multipliers of other constraints, or a sum of norms of such (reactions.py), or a limit of its own.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ from fnmatch import fnmatchcase
 
 from ..errors import RequestError, UsageError
 from ..methods import AUTO, DIFFERENTIATED, EXPLICIT, METHODS, UNLESS_STIFF, integrators, unknown
-from ..numeric.tolerance import DEFAULT_TOLERANCE, tolerance_problem
+from ..numeric.thresholds import DEFAULT_TOLERANCE, tolerance_problem
 from .elements import NAME, is_number
 
 

@@ -5,7 +5,7 @@
 
 A cubic spline through the points (de Boor, A Practical Guide to Splines, ch. IV).  SymPy sees a function
 with derivatives road_x, road_xx, road_xxx and never its pieces; code that is printed for it searches
-the knots and evaluates a polynomial (numeric/cubic.py).
+the knots and evaluates a polynomial (numeric/functions.py).
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ import sympy as sp
 
 from ..errors import LagfmuWarning, TableError, UnitError
 from ..files import content_of, csv_of, foreign
-from ..numeric.cubic import Cubic
+from ..numeric.functions import Cubic
 from .elements import NAME, Expr
 from .units import DisplayUnit, parse_scaled
 

@@ -30,7 +30,7 @@ from ..mechanics.integrability.classify import Classification
 from ..model.model import Contact, Holonomic, Model, Nonholonomic
 from ..model.units import Unit, for_reading
 from ..numeric.start_priority import OMITTED
-from ..prepare.prepare import Prepared
+from ..prepare.steps import Prepared
 from .savings import savings
 from .typeset import typeset
 

@@ -43,9 +43,8 @@ from ..model.picture import (
 from ..model.reactions import multiplier
 from ..model.scene import EVERYTHING, select
 from ..model.spline import SplineBase
-from ..numeric.closed import rotation
-from ..numeric.cubic import Cubic
-from ..prepare.prepare import Prepared
+from ..numeric.functions import Cubic, rotation
+from ..prepare.steps import Prepared
 
 Packed = float | str | list[Any]
 FUNCTIONS: Mapping[Any, str] = {

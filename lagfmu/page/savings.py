@@ -14,7 +14,8 @@ from ..mechanics.equations import EquationsOfMotion
 from ..mechanics.prune import idle as idle_parameters
 from ..model.elements import Expr
 from ..model.units import Unit
-from ..prepare.prepare import Prepared, prepare
+from ..prepare.prepare import prepare
+from ..prepare.steps import Prepared
 
 PYTHON, NATIVE = "bytes of generated Python", "bytes of generated C"
 OPERATIONS = "operations of the right-hand side"

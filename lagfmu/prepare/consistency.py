@@ -30,15 +30,13 @@ from ..names import RESIDUAL, name
 from ..numeric.failure import OmittedStartError, StepFailureError
 from ..numeric.initialization import initial_positions
 from ..numeric.instant import at_start, expanded
-from ..numeric.motion import friction_law
+from ..numeric.motion import MISSED, friction_law, rank_of
 from ..numeric.nominals import Mask, in_speeds
-from ..numeric.rank import MISSED, rank_of
 from ..numeric.start import Start, start
 from ..numeric.start_priority import GIVEN
 from ..numeric.system import NONHOLONOMIC, Sparse, System, Vector
 from ..numeric.thresholds import RANK
-from .diagnosis import cause_of_failure, negative_energy
-from .starts import priorities
+from .starts import cause_of_failure, negative_energy, priorities
 from .steps import Lowered, Structure
 
 TRIALS = 5

@@ -18,7 +18,7 @@ from ..fmu.closed_forms import motion_of, needed, stated
 from ..fmu.read import Trajectory
 from ..model.closed_form import GROUND, Act, Laws, Where
 from ..model.elements import Expr
-from ..numeric.closed import rotation
+from ..numeric.functions import rotation
 from .check import Check
 from .closed_forms import evaluate, measured
 

@@ -40,9 +40,10 @@ from ..model.rule import missing
 from ..model.scene import Scene
 from ..model.units import for_reading
 from ..numeric.start_priority import LEFT_OUT, MISSES
-from ..numeric.tolerance import tolerance_problem
-from ..prepare.prepare import Prepared, prepare
+from ..numeric.thresholds import tolerance_problem
+from ..prepare.prepare import prepare
 from ..prepare.starts import check_given, tell
+from ..prepare.steps import Prepared
 from .reference import Driven, driven
 
 if TYPE_CHECKING:

@@ -11,8 +11,7 @@ from ...mechanics.equations import EquationsOfMotion
 from ...mechanics.formulations import Form
 from ...mechanics.jumps import with_switch_states
 from ...model.elements import TIME, Expr
-from ...numeric.closed import OPERATIONS
-from ...numeric.cubic import Cubic
+from ...numeric.functions import OPERATIONS, Cubic
 from ...numeric.system import System
 from ..parts import Function, Parts, parts_of
 from .function import function, identifiers, in_loops, table_name
@@ -24,7 +23,7 @@ def source(form: Form) -> str:
     """Python text that defines SYSTEM, the numeric form of the equations.
 
     It needs the names System, Row, Own, Friction, Lookups and Embedding of `lagfmu.numeric.system`, and Cubic
-    where there are tables, and the functions of numeric/closed.py where there are bodies in space.
+    where there are tables, and the functions of numeric/functions.py where there are bodies in space.
     """
     form, jumps = with_switch_states(form)
     whole = parts_of(form, jumps)

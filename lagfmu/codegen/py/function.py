@@ -20,7 +20,7 @@ from sympy.printing.pycode import PythonCodePrinter
 from ...errors import DerivationError
 from ...model.attitude import VECTOR, ClosedFunction, Closing, Step
 from ...model.elements import Expr
-from ...numeric.closed import OPERATIONS
+from ...numeric.functions import OPERATIONS
 from ..alike import DATA, Kind, data_of, kinds, runs
 from ..parts import Arguments, Function, identifier
 

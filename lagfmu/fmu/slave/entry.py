@@ -19,8 +19,7 @@ from .references import end_once, keep, keep_module_of
 from .script import Facts, Variable
 
 try:
-    from ...numeric.closed import across, levers, rotation, turned
-    from ...numeric.cubic import Cubic
+    from ...numeric.functions import Cubic, across, levers, rotation, turned
     from ...numeric.system import Embedding, Lookups, Own, Row, System
     from .fmi2 import LagfmuSlave
 except Exception as error:  # a NumPy of another Python, or an old one, fails in many ways

@@ -19,8 +19,7 @@ from ...numeric.failure import StepFailureError
 from ...numeric.start import start
 from ...numeric.start_priority import GIVEN, OMITTED, SET, left_out
 from ...numeric.system import System
-from ...numeric.thresholds import SMALLEST_TOLERANCE
-from ...numeric.tolerance import tolerance_problem
+from ...numeric.thresholds import SMALLEST_TOLERANCE, tolerance_problem
 from ...solver.advance import advance, looked_at
 from ...solver.crossing import check_crossing
 from ...solver.equations import Motion

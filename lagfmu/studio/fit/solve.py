@@ -17,7 +17,7 @@ from ...fmu.session import RefusalError, Session
 from ...fmu.write import as_fmu
 from ...model.model import Model
 from ...model.scene import Scene
-from ...numeric.tolerance import tolerance_problem
+from ...numeric.thresholds import tolerance_problem
 from ...prepare.starts import tell
 from .problem import LOSSES, Problem, Series, derivatives_of, experiments_of, problem_of
 from .result import Fit, certainty

@@ -25,8 +25,9 @@ from ...model.scene import Scene
 from ...page.documentation import mathml
 from ...page.picture import PICTURE, PRESET, picture_of, preset_of, read_picture, read_preset
 from ...page.typeset import typeset
-from ...prepare.prepare import Prepared, prepare
+from ...prepare.prepare import prepare
 from ...prepare.starts import check_given, tell
+from ...prepare.steps import Prepared
 from .page import Playable, Section, equations_of, facts, render, safe_mathml
 
 IMPORTER = "importer.c"

@@ -15,7 +15,7 @@ from ...fmu.described import ICON
 from ...numeric.instant import at_start, expanded
 from ...page.picture import names_in, picture_of
 from ...prepare.consistency import posed
-from ...prepare.prepare import Prepared
+from ...prepare.steps import Prepared
 from .shapes import BETWEEN, TOWARDS, Array, Moving, in_order, shade
 
 PAGE = Path(__file__).parent / "web" / "page.css"  # has the colours, of light paper first

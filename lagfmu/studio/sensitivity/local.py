@@ -40,7 +40,7 @@ from ...model.model import Model
 from ...model.rule import Rule, missing
 from ...model.scene import Scene
 from ...model.units import for_reading
-from ...numeric.tolerance import tolerance_problem
+from ...numeric.thresholds import tolerance_problem
 from ...page.table import as_text, new_table
 from ...prepare.starts import tell
 from ...verification.reference import Driven, driven

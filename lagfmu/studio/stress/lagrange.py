@@ -39,8 +39,8 @@ from ...model.closed_form import ClosedForm, in_variables, output
 from ...model.elements import TIME, Constraint, Expr, Tie
 from ...model.model import Contact, Friction, Model, Nonholonomic, name_of
 from ...model.speeds import quaternions
-from ...numeric.closed import across
-from ...prepare.prepare import Prepared
+from ...numeric.functions import across
+from ...prepare.steps import Prepared
 from .invariants import EQUATION, MASSLESS, RATE, SLOW, magnitude
 from .specimen import beside
 

@@ -37,7 +37,7 @@ from ...interface.variables import unsettable
 from ...model.model import Model
 from ...model.rule import Rule
 from ...model.scene import Scene
-from ...numeric.tolerance import tolerance_problem
+from ...numeric.thresholds import tolerance_problem
 from ...verification.reference import Driven, driven
 from .design import Design, Values, design, number
 from .engine import asked_to_stop, closed, connected, distributed, local

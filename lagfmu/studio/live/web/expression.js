@@ -3,7 +3,7 @@
  * They are data of the FMU, evaluated here and never run as a program.  page/picture.py has the
  * same operations. */
 
-/* A table at x: whether it repeats, then a knot and its four coefficients, row by row (numeric/cubic.py). */
+/* A table at x: whether it repeats, then a knot and its four coefficients, row by row (numeric/functions.py). */
 function spline(x, periodic, ...rows) {
   const last = rows.length - 5;
   const period = rows[last] - rows[0];
