@@ -182,7 +182,7 @@ def _tell(model: Model, given: Mapping[str, float], found: Array, size: float) -
             told = is_now if abs(is_now) > CLOSED * abs(asked) else 0.0
             warnings.warn(
                 f"model {model.name!r}: the joints do not allow the given start {name} = {asked!r}, alone "
-                f"or with the other given values: the mechanism starts with {name} = {told!r} instead",
+                f"or with the other given values: the mechanism starts with {name} = {told:.9g} instead",
                 GivenStartWarning,
                 stacklevel=5,
             )
