@@ -12,6 +12,7 @@ from .codegen.c.equations import model_source
 from .codegen.c.printer import HELPERS, identifiers, number, string
 from .codegen.c.sparsity import Elimination, eliminate, plan, solve_source
 from .codegen.py.equations import lower
+from .codegen.py.equations import source as python_source
 from .files import write_whole
 from .fmu import archive, compiler, described
 from .fmu import target as targets

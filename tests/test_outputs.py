@@ -27,7 +27,7 @@ from lagfmu import (
     simulate,
 )
 from lagfmu.errors import ModelError, SimulationError
-from lagfmu.testing import OWN, prepare, quantities, with_outputs
+from lagfmu.testing import OWN, prepare, python_source, quantities, with_outputs
 from lagfmu.testing import documentation_page as page
 
 t = dynamicsymbols._t
@@ -193,7 +193,7 @@ def test_an_output_of_many_coordinates_reads_those_that_it_holds():
             parameters=CONSTANTS[:1],
             outputs=[Output("middle", (places[0] + places[2]) / 2, "m")],
         )
-        text = prepare(model).text
+        text = python_source(prepare(model).coded)
         return text[text.index("def output_0(") :].partition("\n\n")[0]
 
     assert code(30) == code(3)

@@ -17,6 +17,7 @@ import pythonfmu
 from fmpy.fmi1 import FMICallException
 
 from .. import names
+from ..codegen.py.equations import source
 from ..errors import BuildError
 from ..interface.variables import Variable, VariableTable, rules_of
 from ..mechanics.kinematics import start_names
@@ -177,7 +178,7 @@ def _settings(prepared: Prepared) -> dict[str, Any]:
 
 
 def _script(prepared: Prepared, table: VariableTable, package: str) -> str:
-    equations = prepared.text
+    equations = source(prepared.coded)
     rows = "".join(f"    {_row(v)!r},\n" for v in table.variables)
     words = [w for w in VOCABULARY if re.search(rf"\b{w}\(", equations)]
     return SCRIPT.format(

@@ -10,6 +10,7 @@ import sympy as sp
 from ..codegen.c.equations import model_source
 from ..codegen.c.interface import needs_tangents
 from ..codegen.c.sparsity import plan
+from ..codegen.py.equations import source
 from ..mechanics.equations import EquationsOfMotion
 from ..mechanics.prune import idle as idle_parameters
 from ..model.elements import Expr
@@ -57,7 +58,7 @@ def cost(prepared: Prepared) -> Cost:
         "contacts that are watched": len(prepared.system.contacts),
         "methods to choose from": len(prepared.scene.selectable),
         OPERATIONS: operations(stepped),
-        PYTHON: len(prepared.text.encode()),
+        PYTHON: len(source(form).encode()),
         NATIVE: len(model_source(form, tangents).encode()),
     }
 

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from .. import names
-from ..codegen.py.equations import compile_system, source
 from ..codegen.py.equations import lower as lowered_form
 from ..errors import CannotStartError, DerivationError, LagfmuWarning, ModelError, RequestError
 from ..interface.table import differentiated, named, variable_table
@@ -339,14 +338,13 @@ def _with_numbers(form: Form, fixed: Mapping[Expr, Expr]) -> Form:
 
 
 def lower(reduced: Reduced) -> Lowered:
-    """To the variables of the FMU, and to numbers: the equations as the text of a Python module."""
+    """To the variables of the FMU, and to numbers."""
     table = reduced.whole
-    text = source(reduced.coded)
-    examined = system = compile_system(text)
+    examined = system = lowered_form(reduced.coded)
     if reduced.coded is not reduced.form:
         table, examined = variable_table(reduced.coded, reduced.scene), lowered_form(reduced.form)
     table = table.keeping(reduced.outputs)
-    return Lowered(**vars(reduced), table=table, text=text, system=system, examined=examined)
+    return Lowered(**vars(reduced), table=table, system=system, examined=examined)
 
 
 def examine(lowered: Lowered) -> Prepared:

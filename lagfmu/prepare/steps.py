@@ -99,11 +99,10 @@ class Reduced(Narrowed):
 
 @dataclass(frozen=True)
 class Lowered(Reduced):
-    """`table`: the variables of the FMU; `text`: the Python of `coded`, `system`:
-    what that defines; `examined`: the system of `form`, before anything was left out of the code."""
+    """`table`: the variables of the FMU; `system`: the numeric form of `coded`, `examined`: that of `form`,
+    before anything was left out of the code."""
 
     table: VariableTable
-    text: str
     system: System
     examined: System
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property, partial
+from typing import Any, TypeAlias
 
 from ...mechanics.equations import EquationsOfMotion
 from ...mechanics.formulations import Form
@@ -16,6 +17,7 @@ from ...numeric.system import System
 from ..parts import Function, Parts, parts_of
 from .function import function, identifiers, in_loops, table_name
 
+Text: TypeAlias = Callable[[], str]
 OBSERVED = ("t", "q", "v", "vdot", "u", "p", "lam", "Q")  # what outputs are functions of
 
 
@@ -26,10 +28,45 @@ def source(form: Form) -> str:
     where there are tables, and the functions of numeric/functions.py where there are bodies in space.
     """
     form, jumps = with_switch_states(form)
-    whole = parts_of(form, jumps)
-    pieces = [piece for parts in whole for piece in (*_embedding(parts), *_system(parts))]
-    text = "\n\n".join([*pieces, f"SYSTEM = {_label(whole[-1])}\n"])
-    return _imported(_tables(form.equations, text) + text)
+    pieces = []
+    for parts in parts_of(form, jumps):
+        pieces += [text() for text in _functions(parts).values()] + [_system(parts)]
+    return _complete(form.equations, "\n\n".join([*pieces, f"SYSTEM = {_label(parts)}\n"]))
+
+
+def lower(form: Form) -> System:
+    """What that text defines, ready for the solver; each function is printed when it is called first."""
+    form, jumps = with_switch_states(form)
+    scope = _vocabulary()
+    for parts in parts_of(form, jumps):
+        for name, text in _functions(parts).items():
+            scope[name] = _Function(form.equations, name, text)
+        exec(_system(parts), scope)
+    system: System = scope[_label(parts)]
+    return system
+
+
+class _Function:
+    """A function that is printed and compiled when it is called first."""
+
+    def __init__(self, eom: EquationsOfMotion, name: str, text: Text) -> None:
+        self.eom, self.name, self.text = eom, name, text
+
+    @cached_property
+    def made(self) -> Callable[..., Any]:
+        """What the text defines."""
+        scope = _vocabulary()
+        exec(compile(_complete(self.eom, self.text()), "<lagfmu equations>", "exec"), scope)
+        found: Callable[..., Any] = scope[self.name]
+        return found
+
+    def __call__(self, *arguments: Any) -> Any:
+        return self.made(*arguments)
+
+
+def _complete(eom: EquationsOfMotion, text: str) -> str:
+    """The text with what it imports and the tables that it looks up."""
+    return _imported(_tables(eom, text) + text)
 
 
 def _tables(eom: EquationsOfMotion, text: str) -> str:
@@ -54,11 +91,11 @@ def _imported(text: str) -> str:
     return (f"from math import {', '.join(called)}\n\n\n" if called else "") + text
 
 
-def compile_system(text: str) -> System:
-    """Run generated source in memory and take its SYSTEM."""
+def _vocabulary() -> dict[str, Any]:
+    """The names that generated source needs."""
     from ...numeric import system as vocabulary
 
-    scope: dict[str, Any] = {
+    return {
         "System": vocabulary.System,
         "Own": vocabulary.Own,
         "Lookups": vocabulary.Lookups,
@@ -68,14 +105,6 @@ def compile_system(text: str) -> System:
         "Friction": vocabulary.Friction,
         **OPERATIONS,
     }
-    exec(compile(text, "<lagfmu equations>", "exec"), scope)
-    system: System = scope["SYSTEM"]
-    return system
-
-
-def lower(form: Form) -> System:
-    """The numeric form, ready for the solver."""
-    return compile_system(source(form))
 
 
 def _label(parts: Parts) -> str:
@@ -93,25 +122,23 @@ def _define(f: Function, names: Mapping[Expr, str], prefix: str = "") -> str:
     )
 
 
-def _embedding(parts: Parts) -> list[str]:
-    eom = parts.eom
-    return [_define(f, _names(eom.q, eom.v, eom.driven, eom.p)) for f in parts.embedding]
-
-
-def _functions(parts: Parts) -> dict[str, str]:
-    """The text of each function but those of the model's outputs; the energies of the full system serve the
-    reduced one too."""
-    eom, found = parts.eom, {}
+def _functions(parts: Parts) -> dict[str, Text]:
+    """The functions by name, which the System holds; the energies of the full system serve the reduced one
+    too."""
+    eom, found = parts.eom, dict[str, Text]()
     names = _names(eom.q, eom.v, eom.driven, eom.p)
+    for f in parts.embedding:
+        found[f.name] = partial(_define, f, names)
     for f in parts.functions:
         if f.name != "outputs" and not (f.name == "energies" and parts.prefix):
-            found[f.name] = _define(f, names, parts.prefix)
-    return found
+            found[parts.prefix + f.name] = partial(_define, f, names, parts.prefix)
+    return found | {name: text for of in _outputs(parts).values() for name, text in of.items()}
 
 
-def _system(parts: Parts) -> list[str]:
-    """The functions, then the System that holds them."""
-    eom, p, own, texts = parts.eom, parts.prefix, _outputs(parts), _functions(parts)
+def _system(parts: Parts) -> str:
+    """The System that holds the functions."""
+    eom, p, own = parts.eom, parts.prefix, _outputs(parts)
+    texts = {name.removeprefix(p) for name in _functions(parts)}
     fields = {
         "coordinates": _strings(eom.q),
         "speeds": _strings(eom.v),
@@ -170,12 +197,12 @@ def _system(parts: Parts) -> list[str]:
     if own:
         fields["outputs"] = "".join(["(\n", *(f"        {made},\n" for made in own), "    )"])
     lines = "".join(f"    {name}={value},\n" for name, value in fields.items())
-    return [*texts.values(), *own.values(), f"{_label(parts)} = System(\n{lines})\n"]
+    return f"{_label(parts)} = System(\n{lines})\n"
 
 
-def _outputs(parts: Parts) -> dict[str, str]:
-    """What makes each of the model's own outputs in the System -> the text of its functions."""
-    eom, found = parts.eom, {}
+def _outputs(parts: Parts) -> dict[str, dict[str, Text]]:
+    """What makes each of the model's own outputs in the System -> its functions."""
+    eom, found = parts.eom, dict[str, dict[str, Text]]()
     names = _names(eom.q, eom.v, eom.vdot, eom.driven, eom.p, eom.lam, eom.Q)
     for f in parts.functions:
         if f.name != "outputs":
@@ -188,9 +215,10 @@ def _outputs(parts: Parts) -> dict[str, str]:
             if o.otherwise is not None:
                 made[f"otherwise_{k}"] = (f"{o.name} where it has no value.", other)
             said = [repr(o.name), *made, *(["unique=True"] if o.unique else [])]
-            found[f"Own({', '.join(said)})"] = "\n\n".join(
-                _output(name, doc, x.expression, place, names) for name, (doc, x) in made.items()
-            )
+            found[f"Own({', '.join(said)})"] = {
+                name: partial(_output, name, doc, x.expression, place, names)
+                for name, (doc, x) in made.items()
+            }
     return found
 
 
