@@ -4,6 +4,8 @@ control by collocation on the FMU."""
 from __future__ import annotations
 
 import importlib.util
+import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -116,6 +118,20 @@ def test_the_program_runs(swing):
     )
     assert done.returncode == 0, done.stderr
     assert "ends at y = 1.0000" in done.stdout
+
+
+def test_the_lines_of_the_documentation_load_an_fmu(native_fmu, tmp_path, monkeypatch):
+    """As they stand in docs/importers.md, with the FMU where they look: six states, one input, one force."""
+    page = (PROGRAM.parent / "importers.md").read_text(encoding="utf-8")
+    (block,) = (b for b in re.findall(r"```python\n(.*?)```", page, re.DOTALL) if "DaeBuilder" in b)
+    (path,) = re.findall(r'"(\S+\.fmu)"', block)
+    (tmp_path / path).parent.mkdir(parents=True)
+    shutil.copy(native_fmu("CartPendulum"), tmp_path / path)
+    monkeypatch.chdir(tmp_path)
+    names = {}
+    exec(block, names)
+    assert (names["f"].size1_in(0), names["f"].size1_in(1)) == (6, 1)
+    assert names["force"].size1_out(0) == 1
 
 
 def test_casadi_knows_no_structural_parameters(fmi3_dae, tmp_path):
