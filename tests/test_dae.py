@@ -10,6 +10,7 @@ import fmpy
 import numpy as np
 import pytest
 import redundant
+import two_feet
 from dae import MANIFEST, NAMESPACE, Importer, Manifest, solve
 from fmpy.validation import validate_fmu
 from linkages import FOUR_BAR, rods
@@ -17,7 +18,19 @@ from sympy import sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 from test_forged_states import HEAD, forged
 
-from lagfmu import Holonomic, Input, Model, Nonholonomic, Parameter, Scene, build_fmu, simulate
+from lagfmu import (
+    Contact,
+    Friction,
+    Holonomic,
+    Input,
+    Model,
+    Nonholonomic,
+    Parameter,
+    Scene,
+    build_fmu,
+    multiplier,
+    simulate,
+)
 from lagfmu.errors import ModelError, UsageError
 from lagfmu.testing import RedundantConstraintWarning, find_compiler
 
@@ -418,6 +431,74 @@ def test_of_constraints_that_say_the_same_one_bears_the_force(path, tmp_path, tw
     made.close()
 
 
+@pytest.mark.filterwarnings("ignore::lagfmu.testing.RedundantConstraintWarning")
+def test_two_feet_that_stick_share_their_force_as_an_importer_finds_it(path, tmp_path):
+    """Of two rows that say the same one is left out: its lambda is 0, the other bears m g sin(alpha) alone,
+    more than the cone of its foot; the pair holds all the same, since some share lies in both cones."""
+    made = Importer(path(two_feet.model), tmp_path)
+    n = made.count
+    assert np.linalg.matrix_rank(made.jacobian(0.0, made.begin())[n:, n:]) == 4
+    found = solve(made, np.linspace(0.0, 0.5, 6), 1e-9)
+    low, low_rests, up, up_rests = found[-1, n:]
+    assert low_rests + up_rests == pytest.approx(-9.81 * np.sin(0.4), rel=1e-9)
+    assert low_rests * up_rests == 0
+    assert abs(low_rests + up_rests) > 0.5 * max(low, up)
+    assert made.events < 10
+    grips = [made.references[f"sticks.grip_{foot}"] for foot in ("low", "up")]
+    assert made.fmu.getBoolean(grips) == [True, True]
+    assert np.abs(found[-1, :n] - found[0, :n]).max() < 1e-9
+    made.close()
+
+
+def hung() -> Model:
+    """A block on a spring and a rough floor; a bob hangs on it by a rod that is told twice."""
+    k, mu, M = symbols("k mu M", positive=True)
+    x, z, u, w = dynamicsymbols("x z u w")
+    rod = (u - x) ** 2 + (w - z) ** 2 - L**2
+    return Model(
+        "Hung",
+        lagrangian=M * (x.diff() ** 2 + z.diff() ** 2) / 2
+        + m * (u.diff() ** 2 + w.diff() ** 2) / 2
+        - g * (M * z + m * w)
+        - k * x**2 / 2,
+        coordinates=dict.fromkeys((x, z, u, w), "m"),
+        constraints=[
+            Contact("floor", z),
+            Nonholonomic("slide", x.diff(), while_closed="floor"),
+            Friction("grip", of=["slide"], normal=multiplier("floor"), static=mu, kinetic=mu),
+            Holonomic("rod", rod),
+            Holonomic("again", 2 * rod),
+        ],
+        parameters=[
+            *(Parameter(m, 1.0, "kg"), Parameter(M, 2.0, "kg"), Parameter(g, 9.81, "m/s^2")),
+            *(Parameter(L, 0.5, "m"), Parameter(k, 60.0, "N/m"), Parameter(mu, 0.2, "1")),
+        ],
+        start={x: 0.0, u: 0.4, w: -0.3},
+    )
+
+
+@pytest.mark.filterwarnings("ignore::lagfmu.testing.RedundantConstraintWarning")
+def test_ida_meets_slip_and_stick_beside_constraints_that_say_the_same(path, tmp_path):
+    """The bob drags the block to and fro: modes, states, the force of the floor and that of the rods together
+    are those of co-simulation; of the rods one bears it."""
+    pytest.importorskip("sksundae", reason="pip install -e '.[test]'")
+    times = np.linspace(0, 2.0, 41)
+    own = simulate(path(hung()), stop_time=2.0, step_size=0.05, tolerance=1e-12)
+    made = Importer(path(hung()), tmp_path, 1e-11)
+    found = solve(made, times, 1e-11)
+    columns = {made.names[k]: found[:, j] for j, k in enumerate(made.known)}
+    assert own["slipping.grip.count"][-1] >= 2
+    for name in ("slipping.grip.count", "sticking.grip.count"):
+        assert made.fmu.getInt32([made.references[name]])[0] == own[name][-1]
+    for name in ("x", "u", "w", "der(x)", "der(u)", "lambda.floor", "lambda.slide"):
+        scale = np.abs(own[name]).max()
+        np.testing.assert_allclose(columns[name], own[name], atol=1e-7 * scale)
+    rods = [of["lambda.rod"] + 2 * of["lambda.again"] for of in (columns, own)]
+    np.testing.assert_allclose(*rods, atol=1e-7 * np.abs(rods[1]).max())
+    assert (columns["lambda.rod"] * columns["lambda.again"] == 0).all()
+    made.close()
+
+
 # ---------------------------------------------------------------------------- derivatives
 
 AWAY = {"SlippingSphere": 0.45, "Belt": 1.2, "HalfCar": 0.35, "BouncingBall": 0.1}  # s, amid modes
@@ -577,6 +658,29 @@ def test_what_has_no_mass_of_its_own_is_refused_by_name(tmp_path):
 def test_scenes_that_cannot_have_it_are_refused(tmp_path, scene, part):
     """Another formulation, no model exchange, no multiplier among the outputs."""
     assert part in refused(pendulum, tmp_path, scene=Scene("P", **scene))
+
+
+@pytest.mark.filterwarnings("ignore::lagfmu.testing.RedundantConstraintWarning")
+def test_a_friction_whose_normal_force_is_shared_is_refused(tmp_path):
+    """Of two guides that say the same nobody knows which presses."""
+    mu = symbols("mu", positive=True)
+    text = refused(
+        Model(
+            name="Guided",
+            lagrangian=m * (x.diff() ** 2 + z.diff() ** 2) / 2 - m * g * z,
+            coordinates={x: "m", z: "m"},
+            constraints=[
+                Holonomic("guide", z),
+                Holonomic("again", 2 * z),
+                Nonholonomic("slide", x.diff()),
+                Friction("grip", of=["slide"], normal=multiplier("guide"), static=mu),
+            ],
+            parameters=[*pendulum.parameters[:2], Parameter(mu, 0.3, "1")],
+            start={x.diff(): 1.0},
+        ),
+        tmp_path,
+    )
+    assert "'again') share the normal force of 'grip'" in text
 
 
 def test_without_constraints_there_is_nothing_to_solve_for(tmp_path):

@@ -122,10 +122,10 @@ def check_dae(prepared: Prepared) -> None:
         )
     elif not system.rows:
         problems.append("--dae: there is no constraint, and no multiplier to solve for")
-    if found.redundant and system.frictions:
+    if found.undecided:
         problems.append(
-            f"--dae: the constraints {', '.join(map(repr, found.redundant))} follow from others, and the "
-            "frictions share in their multipliers, which have no one value: leave them out"
+            f"--dae: constraints that follow from others ({', '.join(map(repr, found.redundant))}) share the "
+            f"normal force of {', '.join(map(repr, found.undecided))}, which has no one value: leave them out"
         )
     problems += _massless(prepared)
     problems += [

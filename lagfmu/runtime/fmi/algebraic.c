@@ -40,11 +40,39 @@ static void dae_set(Instance *x, const Variable *v, double value) {
     state_anew(x);
 }
 
+/* Of rows that depend on each other those of the basis act; the rows of frictions are among all. */
+static int acts(const Solver *s, int k) {
+    if (s->stepped.friction == NULL) return solver_rows(s)[k];
+    return s->stepped.friction->acting[k] && (!s->state.now.dependent || s->state.basis[k]);
+}
+
+static Status dae_factor(Instance *x) {
+    Mechanism *b = &x->solver.stepped;
+    for (int k = 0; k < b->system->m; k++) b->pulls[k] = acts(&x->solver, k);
+    return linear_factor(&b->linear, b->M, b->G, b->pulls);
+}
+
+/* The same forces by the multipliers of the basis alone. */
+static Status gather(Instance *x) {
+    Mechanism *b = &x->solver.stepped;
+    const Sensitivity *w = &x->solver.sensitivity;
+    const int m = b->system->m;
+    memset(w->b, 0, (size_t)b->system->nv * sizeof *w->b);
+    memset(w->c, 0, (size_t)m * sizeof *w->c);
+    for (int k = 0; k < m; k++)
+        if (b->friction->acting[k]) mechanism_push(b, k, -b->lambda[k], w->b);
+    if (dae_factor(x) != OK || linear_solve(&b->linear, w->b, w->c, w->dvdot, w->dlambda) != OK) return FAILED;
+    for (int k = 0; k < m; k++)
+        if (b->friction->acting[k]) x->multiplier[k] = w->dlambda[k];
+    state_anew(x);
+    return OK;
+}
+
 static Status dae_renew(Instance *x) {
     if (!x->dae) return OK;
     if (exchange_evaluate(x) != OK) return FAILED;
     memcpy(x->multiplier, x->solver.stepped.lambda, (size_t)MODEL_SYSTEM->m * sizeof *x->multiplier);
-    return OK;
+    return MODEL_SYSTEM->frictions > 0 && x->solver.state.now.dependent ? gather(x) : OK;
 }
 
 static void impose(Instance *x, int imposed) {
@@ -69,17 +97,12 @@ static int slipping_of_row(const Mechanism *b, int k, int *r) {
     return i;
 }
 
-/* (m) the rows whose accelerations hold. */
-static const int *acting_rows(const Solver *s) {
-    return s->stepped.friction != NULL ? s->stepped.friction->acting : solver_rows(s);
-}
-
 static Status dae_equation(Instance *x, int k, double *value) {
     Solver *s = &x->solver;
     Mechanism *b = &s->stepped;
     int r;
     if (instance_observe(x) != OK || exchange_multipliers(x) != OK) return FAILED;
-    if (acting_rows(s)[k]) *value = mechanism_row(b, k, b->vdot) - b->gamma[k];
+    if (acts(s, k)) *value = mechanism_row(b, k, b->vdot) - b->gamma[k];
     else {
         const int i = slipping_of_row(b, k, &r);
         const struct FrictionForces *f = b->friction;
@@ -93,10 +116,10 @@ static double dae_change(const Instance *x, int k) {
     const Sensitivity *w = &s->sensitivity;
     int r;
     if (!x->imposed) return NAN;
-    if (acting_rows(s)[k]) return sensitivity_acceleration(w, &s->stepped, k);
+    if (acts(s, k)) return sensitivity_acceleration(w, &s->stepped, k);
     const int i = slipping_of_row(&s->stepped, k, &r);
     return w->dlambda[k] - (i < 0 ? 0 : w->dpush[2 * i + r]);
 }
 
 SHARED_VALUE const Algebraic MULTIPLIERS_GIVEN = {
-    dae_settable, dae_set, apply_multipliers, dae_renew, dae_give, dae_take, dae_equation, dae_change};
+    dae_settable, dae_set, apply_multipliers, dae_renew, dae_give, dae_take, dae_factor, dae_equation, dae_change};

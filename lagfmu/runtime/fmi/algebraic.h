@@ -28,6 +28,8 @@ typedef struct {
     Status (*give)(Instance *x);
     /* Continuous-time mode ends. */
     void (*take)(Instance *x);
+    /* Factors of the rows that stand for all, frictions among them, where all that act were evaluated. */
+    Status (*factor)(Instance *x);
     /* The equation of row k, and its change along the direction that was taken last. */
     Status (*equation)(Instance *x, int k, double *value);
     double (*change)(const Instance *x, int k);

@@ -111,13 +111,26 @@ static int are_close(const Linear *l) {
     return l->rung != RUNG_SCHUR || schur_of(l)->condition > CLOSE;
 }
 
+/* Whether other rows would be chosen now. */
+static Status find_others(Instance *x, int *others) {
+    Solver *s = &x->solver;
+    Mechanism *b = &s->stepped;
+    if (segment_motion_near(s, segment_instant(s, s->state.now.t), s->state.q, s->state.v) != OK) return FAILED;
+    (void)linear_basis(&b->linear, b->pulls);
+    *others = memcmp(b->pulls, s->state.basis, (size_t)s->system->m * sizeof *b->pulls) != 0;
+    return OK;
+}
+
 /* Where multipliers are given, whether other rows are to stand for all, which is for an event. */
 static Status find_worn(Instance *x, int *worn) {
     Mechanism *b = &x->solver.stepped;
+    int others = 0;
     b->given = NULL;
     x->version += 1;
-    const Status evaluated = exchange_evaluate(x);
-    *worn |= evaluated == OK && are_close(&b->linear);
+    Status evaluated = exchange_evaluate(x);
+    if (evaluated == OK && b->friction != NULL) evaluated = ALGEBRAIC->factor(x);
+    if (evaluated == OK && are_close(&b->linear)) evaluated = find_others(x, &others);
+    *worn |= others;
     b->given = x->multiplier;
     x->version += 1;
     return evaluated;

@@ -146,5 +146,6 @@ SHARED void nonunique_best(Mechanism *b, double *best);
 /* 0 if the normal force of friction i is not the only one with the motion that was evaluated last: rows that
  * depend on each other share it. */
 SHARED int normal_is_unique(Mechanism *b, int i);
+SHARED int friction_is_unique(Mechanism *b, int i); /* the same of its own multipliers */
 
 #endif

@@ -198,6 +198,15 @@ int normal_is_unique(Mechanism *b, int i) {
     return 1;
 }
 
+int friction_is_unique(Mechanism *b, int i) {
+    const Nonunique x = nonunique_of(b);
+    const Friction *law = &b->system->friction[i];
+    for (int r = 0; r < law->rows; r++)
+        for (int j = 0; j < x.count; j++)
+            if (fabs(x.Z[j * b->system->m + law->row[r]]) > NONUNIQUE_DEPENDENT) return 0;
+    return 1;
+}
+
 void nonunique_best(Mechanism *b, double *best) {
     const System *s = b->system;
     const int m = s->m;

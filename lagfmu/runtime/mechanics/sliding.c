@@ -217,12 +217,12 @@ static Status check_norms(Mechanism *b, double t) {
     return OK;
 }
 
-/* Normal force and reserve of those that stick. */
-static void find_reserves(Mechanism *b) {
+/* Normal force and reserve of those that stick; `shared`: by whichever multipliers hold the same motion best. */
+static void find_reserves(Mechanism *b, int shared) {
     const System *s = b->system;
     struct FrictionForces *f = b->friction;
     const double *best = b->lambda;
-    if (shares_sticking(b)) {
+    if (shared) {
         nonunique_best(b, f->first);
         best = f->first;
     }
@@ -286,7 +286,7 @@ static Status motion_with_friction(Mechanism *b, Instant at, const double *q, co
     if (sliding > 0 && solve_sliding(b, at.t, linear, sliding) != OK) return FAILED;
     rest(b, v);
     if (b->stage) return OK;
-    if (sticking) find_reserves(b);
+    if (sticking) find_reserves(b, shares_sticking(b));
     for (int i = 0; i < s->frictions; i++) friction_tangential(b, i, b->lambda, f->tangential + 2 * i);
     return OK;
 }
@@ -295,7 +295,8 @@ static Status under_given(Mechanism *b, Instant at, const double *q, const doubl
     struct FrictionForces *f = b->friction;
     if (find_coefficients(b, at, q, v) != OK) return FAILED;
     (void)acting(b, active);
-    if (find_slips(b, v)) find_reserves(b);
+    if (find_slips(b, v)) find_reserves(b, b->dependent);
+    memcpy(b->lambda, b->given, (size_t)b->system->m * sizeof *b->lambda);
     f->slipping = list_sliding(b, 1, list_sliding(b, 0, 0));
     for (int g = 0; g < f->slipping; g++) {
         const int i = f->sliding[g], norms = b->system->friction[i].parts > 1;

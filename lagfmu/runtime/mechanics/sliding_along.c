@@ -100,17 +100,18 @@ static Status solve_given(Sensitivity *w, Mechanism *b, const double *v, Directi
 }
 
 /* Are all multipliers the only ones that friction i is made of? */
-static int is_only_one(const Mechanism *b, int i) {
+static int is_only_one(Mechanism *b, int i) {
     const System *s = b->system;
     const Friction *law = &s->friction[i];
     int all = 1;
+    if (b->given != NULL) return !b->dependent || (normal_is_unique(b, i) && friction_is_unique(b, i));
     for (int r = 0; r < law->rows; r++) all &= b->linear.unique[law->row[r]];
     for (int k = law->first; k < law->first + law->normals; k++) all &= b->linear.unique[s->normal_row[k]];
     return all;
 }
 
 /* Of what is reported: slip velocities, reserves  mu_s N - |lambda_t|  and powers  lambda_t . s. */
-static void find_reported(Sensitivity *w, const Mechanism *b, const double *v, const double *dv) {
+static void find_reported(Sensitivity *w, Mechanism *b, const double *v, const double *dv) {
     const System *s = b->system;
     const struct FrictionForces *f = b->friction;
     for (int i = 0; i < s->frictions; i++) {
