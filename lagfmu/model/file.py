@@ -143,7 +143,7 @@ def _read(value: str, default: Any) -> Any:
 
 # Files that are a model by themselves, by their ending: the module whose read(path, arguments) makes a Model,
 # and whose PYTHON is the file that `new` writes of it.
-READERS = {".urdf": "lagfmu.bodies.urdf_model", ".xml": "lagfmu.bodies.mjcf_model"}
+READERS = {".urdf": "lagfmu.bodies.urdf", ".xml": "lagfmu.bodies.mjcf"}
 
 
 def is_model(path: str | os.PathLike[str]) -> bool:

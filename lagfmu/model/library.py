@@ -80,21 +80,20 @@ def new(path: Path, source: str | None = None) -> Path:
 
     if path.suffix != ".py":
         path = path.with_name(f"{path.name}.py")
-    reader = None if source is None else READERS.get(Path(source).suffix.lower())
-    read = Path(str(source)) if reader is not None else None
-    if read is not None and not read.is_file():
+    read = Path(source or "")
+    reader = READERS.get(read.suffix.lower())
+    if reader and not read.is_file():
         raise UsageError(f"there is no file {source!r}: correct the path")
-    if source is not None and read is None and source not in known():
+    if source is not None and not reader and source not in known():
         raise UsageError(
             f"there is no model {source!r}, expected a URDF or MJCF file, or one of {', '.join(known())}"
         )
     if path.exists():
         raise UsageError(f"{str(path)!r} is there already: choose another name")
-    if read is not None and reader is not None:
+    if reader:
         there = Path(os.path.relpath(read, path.parent)).as_posix()
-        text = importlib.import_module(reader).PYTHON.format(
-            file=read.name, own=path.name, path=there
-        )
+        form = importlib.import_module(reader).PYTHON
+        text = form.format(file=read.name, own=path.name, path=there)
     elif source is not None:
         text = (folder() / f"{source}.py").read_text(encoding="utf-8")
     else:
