@@ -135,7 +135,7 @@ class Reference:
 def _plain(path: Path) -> bytes:
     """What ElementTree reads, too."""
     from lagfmu.bodies import markup
-    from lagfmu.bodies.urdf_text import needed
+    from lagfmu.bodies.check_files import needed
 
     root, problem = markup.read(path)
     if root is None:

@@ -23,8 +23,7 @@ from .body import Marker, Number
 from .draft import Curve, Draft
 from .guess import Guess, Reach
 from .joints import model_number, places
-from .motion import Timed, between, product
-from .vectors import length
+from .motion import Timed, between, length, product
 
 PLACES = 65  # along the curve, at which it is tried where the point may begin
 

@@ -14,9 +14,8 @@ import sympy as sp
 
 from ..model.elements import name_of
 from ..model.model import Model
-from .body import Ground, Marker
+from .body import Ground, Marker, onto, quaternion, rotation_of, turn, turned_by
 from .draft import Draft
-from .rotation import onto, quaternion, rotation_of, turn, turned_by
 from .rows import Array, numbers_of
 
 

@@ -24,8 +24,20 @@ from ..model.reactions import multiplier, norm
 from .body import Marker, Number, several
 from .draft import Draft, Relative, Wrench
 from .guess import Guess, Reach
-from .motion import Placed, Timed, about, between, distance, product
-from .vectors import AXES, cross, dot, minus, plus, times
+from .motion import (
+    AXES,
+    Placed,
+    Timed,
+    about,
+    between,
+    cross,
+    distance,
+    dot,
+    minus,
+    plus,
+    product,
+    times,
+)
 
 CROSS = "cross"  # the row by which the axes of a universal joint stay square
 

@@ -16,9 +16,8 @@ from .body import Body
 from .draft import Draft, Relative
 from .joints import Gear
 from .loads import Force, Rotor, SpringDamper, Torque, Torsion
-from .motion import Placed
+from .motion import AXES, ZERO, Placed
 from .space import PAIRS
-from .vectors import AXES, ZERO
 
 EYE = tuple(sp.Integer(i == j) for i in range(3) for j in range(3))
 STILL = Where(GROUND, ZERO, EYE)

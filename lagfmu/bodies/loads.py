@@ -15,8 +15,7 @@ from ..model.reactions import multiplier
 from .body import Body, Marker, Number
 from .draft import Curve, Draft
 from .joints import places
-from .motion import distance
-from .vectors import AXES, Vector, times
+from .motion import AXES, Vector, distance, times
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,19 +12,43 @@ from ..errors import ModelError
 from ..model.elements import Input, Output, Parameter
 from ..model.model import Model
 from .assembly import assemble
-from .body import Body, Ground
-from .check import problems_of, problems_of_containers
-from .draft import Draft
+from .body import Body, Ground, Marker
+from .check import coinciding, problems_of, problems_of_containers, warn_of_radii
+from .draft import Draft, readings_of
 from .joints import Gear, Joint, Screw
 from .laws import laws_of
 from .loads import Motor, Torsion
+from .motion import AXES
 from .picture import picture_of
 from .plane import PlaneMotion
-from .readings import readings_of
 from .space import SpaceMotion
-from .summary import lines_of
-from .unusual import coinciding, warn_of_radii
-from .vectors import AXES
+
+
+def _lines_of(bodies: Sequence[Body], parts: Sequence[Any]) -> list[tuple[str, str]]:
+    """The name of each, and what it is: what kind of joint it is, of which bodies."""
+    lines = [
+        (body.name, f"body{f': {body.description}' if body.description else ''}") for body in bodies
+    ]
+    return lines + [(part.name, _line(part)) for part in parts]
+
+
+def _line(part: Any) -> str:
+    """The kind, and what it takes hold of: the second first, which receives what is reported."""
+    fields = ("second", "first", "joint", "at", "on")
+    held = [getattr(part, field) for field in fields if getattr(part, field, None) is not None]
+    kind, of = _words(type(part).__name__), " on ".join(map(_name, held))
+    return f"{kind}: {of}" if of else kind
+
+
+def _name(of: Any) -> str:
+    """Of a body, of that of a marker, or of a joint, which may be given by its name."""
+    of = of.body if isinstance(of, Marker) else of
+    return of if isinstance(of, str) else str(of.name)
+
+
+def _words(name: str) -> str:
+    """SpringDamper -> spring damper."""
+    return "".join(f" {c.lower()}" if c.isupper() and k else c.lower() for k, c in enumerate(name))
 
 
 def mechanism(
@@ -99,7 +123,7 @@ def mechanism(
         inputs=[*draft.inputs, *inputs],
         outputs=[*draft.outputs, *outputs],
         descriptions={**descriptions, **{s: of.text for s, of in curves.items()}},
-        parts=lines_of(bodies, parts),
+        parts=_lines_of(bodies, parts),
         laws=laws_of(draft, parts),
         **{"picture": picture_of(draft, parts), **more},
     )

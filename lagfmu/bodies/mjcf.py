@@ -2,6 +2,8 @@
 
 A body keeps its frame, a joint its name and its coordinate: angle.J and position.J are those of the file.
 Constraints are rigid here.  The world is the ground, a body without joints a part of what it is on.
+
+The model that an MJCF file is by itself: all of it, with its own gravity and its actuators, or others.
 """
 
 from __future__ import annotations
@@ -24,17 +26,17 @@ from sympy.physics.vector import dynamicsymbols
 from ..errors import LagfmuWarning, ModelError
 from ..files import foreign
 from ..model.elements import Input, Parameter
+from ..model.model import Model
 from ..model.picture import Box, Rod, Shape, Sphere
 from ..names import RESERVED
-from .body import Body, Ground, Marker
-from .check_mjcf import problems_of_files
-from .inertia import components, together
+from .body import Body, Ground, Marker, onto, turn, turned_by
+from .check_files import problems_of_files
 from .joints import Fixed, Gear, Joint, Prismatic, Revolute, Spherical
 from .loads import Gravity, Motor, Rotor, SpringDamper, Torsion
-from .rotation import onto, turn, turned_by
+from .markup import chosen, components, letters, motors, together
+from .mechanism import mechanism
+from .motion import AXES
 from .series import Series
-from .vectors import AXES
-from .words import letters
 
 Array = NDArray[np.float64]
 FREE, BALL, SLIDE, HINGE = range(4)  # MuJoCo's mjtJoint
@@ -604,3 +606,66 @@ def _square(axes: Array) -> Array:
     """The rotation next to a matrix that is one but for rounding."""
     left, _, right = np.linalg.svd(axes)
     return np.asarray(left @ right)
+
+
+CHOICES = {
+    "key": ("",),
+    "motors": ("file", "none", "torque", "motion"),
+    "limits": ("true", "false"),
+}
+# The Python file that says the same.
+PYTHON = '''"""The mechanism of {file}.  Add motors, contacts and closed loops of your own, then:
+
+    lagfmu simulate {own} --plot out.svg
+"""
+
+from pathlib import Path
+
+from lagfmu import Scene
+from lagfmu.bodies import from_mjcf, mechanism
+
+parts = from_mjcf(Path(__file__).parent / {path!r})  # key="home" begins at that key frame
+model = mechanism(
+    parts.name,
+    bodies=parts.bodies,
+    joints=[*parts.joints],
+    loads=[*parts.loads],  # gravity among them
+    start={{**parts.start}},  # e.g. "angle.j2": 0.5
+    near=parts.near,
+    inputs=parts.inputs,
+    parameters=parts.parameters,
+    description={file!r},
+)
+scenes = [Scene(model.name, stop_time=1.0, step_size=0.01)]
+'''
+
+
+def read(path: Path, arguments: Sequence[str] = ()) -> Model:
+    """The model of an MJCF file; `arguments` are texts key=home, motors=none, torque or motion, limits=false,
+    and starts by names of the FMU, angle.j2=0.5.
+
+    motors= says what stands in place of the actuators of the file: nothing, an input J_motor.torque
+    (J_motor.force) of each joint of one motion that follows no other, or J_motor.angle (J_motor.position).
+    Raises RequestError for arguments, ModelError.
+    """
+    asked, given = chosen(path, arguments, CHOICES)
+    own = asked["motors"] == "file"
+    parts = from_mjcf(path, limits=asked["limits"] == "true", key=asked["key"], actuators=own)
+    if not parts.bodies:
+        raise ModelError(parts.name, ["nothing in the file moves: give a body of it a joint"])
+    if asked["motors"] == "motion" and parts.near:
+        raise ModelError(
+            parts.name,
+            [
+                f"motors=motion: {', '.join(parts.near)} are tied by equalities, so that not each moves by "
+                "itself: choose motors=torque, or write those Motor(..., motion=True) that drive it: lagfmu "
+                f"new my.py --from {path.name}"
+            ],
+        )
+    start = {**parts.start, **given}
+    added = motors(parts.joints, asked["motors"], {**parts.near, **start})
+    return mechanism(
+        parts.name,
+        **{**parts.arguments, "loads": [*parts.loads, *added], "start": start},
+        description=path.name,
+    )

@@ -32,9 +32,8 @@ from .curves import PointOnCurve
 from .draft import Draft
 from .joints import Distance, Gear, Joint, Rolling, Universal
 from .loads import Gravity, Motor, SpringDamper, Torsion
-from .motion import Motion, Placed
+from .motion import AXES, Motion, Placed, Vector, dot, minus, plus, times
 from .solid import holds, solid
-from .vectors import AXES, Vector, dot, minus, plus, times
 
 CARRIED = (Box, Rod, Sphere, Disk, Line, Spring)
 LARGEST = 3.0  # times the farthest distance of a marker from its body's centre: the solid of a body

@@ -15,8 +15,7 @@ from sympy.physics.vector import dynamicsymbols
 from ..model.elements import TIME, Expr, is_number
 from .body import Body, Ground, Marker
 from .draft import Draft
-from .motion import Motion, Placed
-from .vectors import ZERO, Vector, minus
+from .motion import ZERO, Motion, Placed, Vector, minus
 
 EXACT = 12  # parts of pi that an angle may be of, and have a sine without rounding
 

@@ -22,13 +22,25 @@ import sympy as sp
 
 from ..model.elements import Expr
 from ..model.reactions import multiplier
-from .body import Number
+from .body import Number, turn
 from .draft import Draft, Relative, Wrench
 from .guess import Guess, Pose, Reach
 from .joints import CROSS, Joint, model_number
-from .motion import Placed, Timed, TimedVector, between, product
-from .rotation import turn
-from .vectors import AXES, ZERO, Vector, cross, dot, minus, plus, times
+from .motion import (
+    AXES,
+    ZERO,
+    Placed,
+    Timed,
+    TimedVector,
+    Vector,
+    between,
+    cross,
+    dot,
+    minus,
+    plus,
+    product,
+    times,
+)
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,11 +17,9 @@ from sympy.physics.vector import dynamicsymbols
 
 from ..model.attitude import carried, quaternion_rates, rotation_matrix
 from ..model.elements import TIME, Expr
-from .body import Body, Ground, Marker
+from .body import Body, Ground, Marker, Rotation, rotation_of
 from .draft import Draft
-from .motion import Motion, Placed, TimedVector
-from .rotation import Rotation, rotation_of
-from .vectors import AXES, ZERO, Vector, dot, minus
+from .motion import AXES, ZERO, Motion, Placed, TimedVector, Vector, dot, minus
 
 STILL: Rotation = tuple(tuple(sp.Integer(i == j) for j in range(3)) for i in range(3))  # type: ignore[assignment]
 PAIRS = ("xx", "yy", "zz", "xy", "xz", "yz")

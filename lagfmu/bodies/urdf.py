@@ -4,6 +4,8 @@ A link is a body whose own frame is that of the link, so that the FMU's points a
 file; a joint of the file keeps its name, and what it drives turns about the z axis of a marker that is laid
 along the file's axis.  Links that are fixed to another are one body with it.  The root link is the ground, or
 with base='floating' a body.
+
+The model that a URDF file is by itself: all of it, in gravity, with motors where they are asked for.
 """
 
 from __future__ import annotations
@@ -11,7 +13,7 @@ from __future__ import annotations
 import os
 import warnings
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from heapq import heappop, heappush
 from io import BytesIO
@@ -23,16 +25,22 @@ from numpy.typing import NDArray
 
 from ..errors import LagfmuWarning, ModelError
 from ..files import foreign
+from ..model.model import Model
 from ..model.picture import Box, Rod, Shape, Sphere
 from . import markup
-from .body import Body, Ground, Marker
-from .check_urdf import number_of_dynamics, problems_of_parts, problems_of_text, problems_of_tree
-from .inertia import components, together
+from .body import Body, Ground, Marker, onto, quaternion
+from .check_files import (
+    left_out,
+    needed,
+    number_of_dynamics,
+    problems_of_parts,
+    problems_of_text,
+    problems_of_tree,
+)
 from .joints import Fixed, Gear, Joint, Planar, Prismatic, Revolute, Spherical
-from .loads import Torsion
-from .rotation import onto, quaternion
-from .urdf_text import left_out, needed
-from .words import words_of
+from .loads import Gravity, Torsion
+from .markup import chosen, components, motors, together, words_of
+from .mechanism import mechanism
 
 KINDS: dict[str, Any] = {
     "revolute": Revolute,
@@ -343,3 +351,53 @@ def _shapes(link: Any, pose: Pose) -> Iterator[Shape]:
 def _marker(carrier: Body | Ground, pose: Pose) -> Marker:
     rotation = None if np.array_equal(pose[:3, :3], np.eye(3)) else pose[:3, :3].tolist()
     return carrier.at(tuple(map(float, pose[:3, 3])), rotation=rotation)
+
+
+GRAVITY = (0, 0, -9.81)  # m/s^2
+CHOICES = {"base": BASES, "motors": ("none", "torque", "motion"), "limits": ("true", "false")}
+# The Python file that says the same.
+PYTHON = '''"""The robot of {file}.  Add motors, contacts and closed loops of your own, then:
+
+    lagfmu simulate {own} --plot out.svg
+"""
+
+from pathlib import Path
+
+from lagfmu import Scene
+from lagfmu.bodies import Gravity, from_urdf, mechanism
+
+robot = from_urdf(Path(__file__).parent / {path!r})
+model = mechanism(
+    robot.name,
+    bodies=robot.bodies,
+    joints=[*robot.joints],
+    loads=[Gravity((0, 0, -9.81)), *robot.loads],
+    start={{**robot.start}},  # e.g. "angle.j2": 0.5
+    description=robot.description,
+)
+scenes = [Scene(model.name, stop_time=1.0, step_size=0.01)]
+'''
+
+
+def read(path: Path, arguments: Sequence[str] = ()) -> Model:
+    """The model of a URDF file; `arguments` are texts base=floating, motors=torque or motion, limits=false,
+    and starts by names of the FMU, angle.j2=0.5.
+
+    With motors=torque each joint that follows no other has the input J_motor.torque (J_motor.force), with
+    motors=motion J_motor.angle (J_motor.position).  Raises RequestError for arguments, ModelError.
+    """
+    asked, given = chosen(path, arguments, CHOICES)
+    parts = from_urdf(path, limits=asked["limits"] == "true", base=asked["base"])
+    if not parts.bodies:
+        raise ModelError(
+            parts.name, ["nothing in the file moves: give it a joint, or base=floating"]
+        )
+    start = {**parts.start, **given}
+    return mechanism(
+        parts.name,
+        bodies=parts.bodies,
+        joints=parts.joints,
+        loads=[Gravity(GRAVITY), *parts.loads, *motors(parts.joints, asked["motors"], start)],
+        start=start,
+        description=f"{path.name}{f': {parts.description}' if parts.description else ''}",
+    )

@@ -1,13 +1,72 @@
-"""What is wrong with a URDF file, in words, before a body is made of it: its text, its tree, its parts."""
+"""What is wrong with a URDF or MJCF file, in words, before a body is made of it.
+
+
+
+Of the elements of a URDF file those that a mechanism is made of; the others are counted.
+
+What simulators add (colours, sensors, elements and attributes of other namespaces) is never read.
+"""
 
 from __future__ import annotations
 
 import math
 from collections import Counter, defaultdict
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+from lxml import etree
+
+from . import markup
+
+READ = ("include", "model")  # elements that name a file with elements of its own
+
+
+def problems_of_files(path: Path) -> list[str]:
+    """Of the file and of those that it includes; no file is opened but these, all in its folder."""
+    return list(_of_file(path, path.parent.resolve(), (), {path.resolve()}))
+
+
+def _of_file(path: Path, folder: Path, within: tuple[Path, ...], seen: set[Path]) -> Iterator[str]:
+    name = path.name
+    root, problem = markup.read(path)
+    if root is None:
+        yield problem
+        return
+    if not within and root.tag != "mujoco":
+        yield f"the root of {name!r} is <{root.tag}>, expected <mujoco>: name an MJCF file"
+        return
+    if len(within) > markup.DEEPEST:
+        yield f"{name!r} is included by {len(within)} files in turn: write them into one"
+        return
+    for element in (e for e in root.iter() if isinstance(e.tag, str)):
+        yield from _of_named_file(element, name, folder, (*within, path.resolve()), seen)
+
+
+def _of_named_file(
+    e: Any, name: str, folder: Path, within: tuple[Path, ...], seen: set[Path]
+) -> Iterator[str]:
+    where = f"{name!r}: <{e.tag}> in line {e.sourceline}"
+    if e.tag in ("plugin", "instance"):
+        yield f"{where} runs code of a plugin, which nothing here does: leave it out"
+    for key, value in e.attrib.items():
+        if "nan" in value.lower().split():
+            yield f"{where} has {key}={value!r}, expected finite numbers: correct it"
+    named = [(k, v) for k, v in e.attrib.items() if k.startswith("file") or k.endswith("dir")]
+    for key, value in named:
+        target = (folder / value).resolve()
+        if not target.is_relative_to(folder):
+            yield (
+                f"{where} names {value!r}, which is not in the folder of the file: copy it there, and "
+                f"name it by a relative path in {key}="
+            )
+        elif e.tag in READ and target in within:
+            yield f"{where} includes {value!r}, which includes it: leave out one of the two"
+        elif e.tag in READ and target not in seen:
+            seen.add(target)
+            yield from _of_file(target, folder, within, seen)
+
 
 # What an element must have: attributes, and elements in it.
 NEEDED: dict[str, tuple[Sequence[str], Sequence[str]]] = {
@@ -184,3 +243,68 @@ def number_of_dynamics(joint: Any, name: str) -> float:
 
 def _twice(names: Sequence[str]) -> list[str]:
     return sorted(n for n, count in Counter(names).items() if count > 1)
+
+
+LINK = ("inertial", "visual", "collision")
+JOINT = ("origin", "parent", "child", "axis", "limit", "dynamics", "mimic")
+KEPT: Mapping[str, tuple[str, ...]] = {
+    "robot": ("link", "joint"),
+    "link": LINK,
+    "joint": JOINT,
+    "inertial": ("origin", "mass", "inertia"),
+    "visual": ("origin", "geometry"),
+    "collision": ("origin", "geometry"),
+    "geometry": SHAPES,
+}
+MESH = "link/visual/geometry/mesh"
+COUNTED = {"transmission": "transmissions", "gazebo": "extensions of Gazebo"}
+NAMES = ("meshes", "other shapes", *COUNTED.values())
+TOLD = ("effort", "velocity")  # of a limit: nothing enforces them
+
+
+def left_out(root: Any) -> str:
+    """What the file has and a mechanism has not, with counts."""
+    counts = Counter(COUNTED[e.tag] for e in root if e.tag in COUNTED)
+    meshes, others = (sum(1 for _ in found) for found in (root.iterfind(MESH), _unknown(root)))
+    counts |= Counter({"meshes": meshes, "other shapes": others})
+    found = [f"{what} ({counts[what]})" for what in NAMES if counts[what]]
+    return f"{', '.join(found)} are left out" if found else ""
+
+
+def _unknown(root: Any) -> Iterator[Any]:
+    """What looks like nothing that URDF has."""
+    for look in root.iterfind("link/visual"):
+        if look.find("geometry") is not None and not any(
+            look.find(f"geometry/{s}") is not None for s in SHAPES
+        ):
+            yield look
+
+
+def needed(root: Any) -> bytes:
+    """The file without the rest; `root` is changed."""
+    waiting = [root]
+    while waiting:
+        element = waiting.pop()
+        for child in [*element]:
+            if child.tag not in KEPT.get(element.tag, ()):
+                element.remove(child)
+        for name in [n for n in element.attrib if ":" in n or n[0] == "{"]:
+            del element.attrib[name]
+        waiting += element
+    for geometry in [*root.iter("geometry")]:
+        if len(geometry) == 0:
+            look = geometry.getparent()
+            look.getparent().remove(look)
+    for limit in root.iter("limit"):
+        for name in TOLD:
+            if not _is_number(limit.get(name, "0")):
+                del limit.attrib[name]
+    text: bytes = etree.tostring(root)
+    return text
+
+
+def _is_number(text: str) -> bool:
+    try:
+        return bool(float(text) >= 0)
+    except ValueError:
+        return False
