@@ -185,8 +185,8 @@ def _of_references(part: Any, parts: Sequence[Any]) -> Iterator[str]:
             )
         else:
             yield (
-                f"{_kind_of(part)} {part.name!r}: {_kind_of(known[joint])} {joint!r} has no angle or position "
-                f"or both, expected one of {', '.join(fit) or 'none: no joint turns or slides'}"
+                f"{_kind_of(part)} {part.name!r}: {_kind_of(known[joint])} {joint!r} has no angle or "
+                f"position or both, expected one of {', '.join(fit) or 'none: no joint turns or slides'}"
             )
     if len(named) == 2 and len({*map(name_of_joint, named)}) == 1:
         yield f"Gear {part.name!r} ties {name_of_joint(named[0])!r} to itself, expected two joints"
@@ -413,8 +413,8 @@ def warn_of_radii(draft: Draft, parts: Sequence[Any]) -> None:
         radius = _value_of(part.radius)
         if far > 0 and is_number(radius) and float(radius) > far:
             warnings.warn(
-                f"{_kind_of(part)} {part.name!r}: the radius of its pin is {float(radius):g} m, and no marker "
-                f"is farther than {far:g} m from the centre of its body: is it in metres?",
+                f"{_kind_of(part)} {part.name!r}: the radius of its pin is {float(radius):g} m, and no "
+                f"marker is farther than {far:g} m from the centre of its body: is it in metres?",
                 LagfmuWarning,
                 stacklevel=3,
             )
