@@ -18,7 +18,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.optimize import minimize
 
 from ..model.elements import Holonomic
 from ..model.model import Model
@@ -77,6 +76,8 @@ class Nearest:
 
     def _slid(self, q: Array) -> tuple[Array, float]:
         """From q on along the rows to where the values are nearest, and how far off these are."""
+        from scipy.optimize import minimize  # few mechanisms need it
+
         off = self._off(q)
         for _ in range(CHARTS):
             at, N = q, self._free(q)
