@@ -501,14 +501,21 @@ def test_ida_meets_slip_and_stick_beside_constraints_that_say_the_same(path, tmp
 
 # ---------------------------------------------------------------------------- derivatives
 
-AWAY = {"SlippingSphere": 0.45, "Belt": 1.2, "HalfCar": 0.35, "BouncingBall": 0.1}  # s, amid modes
+AWAY = {
+    "SlippingSphere": 0.45,
+    "Belt": 1.2,
+    "HalfCar": 0.35,
+    "BouncingBall": 0.1,
+    "Hung": 0.3,
+}  # s, amid modes
 
 
 @pytest.mark.parametrize(
     "model",
-    [sleigh, four_bar, "Gyroscope", "SlippingSphere", "Belt", "HalfCar", "BouncingBall"],
+    [sleigh, four_bar, "Gyroscope", "SlippingSphere", "Belt", "HalfCar", "BouncingBall", hung()],
     ids=called,
 )
+@pytest.mark.filterwarnings("ignore::lagfmu.testing.RedundantConstraintWarning")
 def test_derivatives_by_states_and_multipliers_are_those_of_differences(path, tmp_path, model):
     """Of q', v', of the equations, the indicators, Q and lambda, by columns and, adjoint, by rows, whatever
     acts, slips or is open; a quaternion that is set is normalized."""
