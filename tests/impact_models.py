@@ -7,6 +7,7 @@ from typing import Any
 
 from sympy import Rational, cos, sin, sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
+from zoo import point_mass
 
 from lagfmu import Contact, Model, Parameter
 
@@ -30,11 +31,13 @@ def rod(
         Contact("left", z - l * sin(theta), restitution=e),
         Contact("right", z + l * sin(theta), restitution=e),
     ]
-    return Model(
-        name="Rod",
-        lagrangian=m * z.diff() ** 2 / 2 + J * theta.diff() ** 2 / 2 - m * g * z,
-        coordinates={z: "m", theta: "rad"},
-        constraints=[feet[k] for k in order],
+    return point_mass(
+        "Rod",
+        "z",
+        [feet[k] for k in order],
+        angles="theta",
+        up=z,
+        energy=J * theta.diff() ** 2 / 2,
         parameters=[
             MASS,
             GRAVITY,
@@ -53,13 +56,13 @@ def table(order: Sequence[int] = (0, 1, 2, 3), value: float = 0.5) -> Model:
         for i in (0, 1)
         for j in (0, 1)
     ]
-    return Model(
-        name="Plate",
-        lagrangian=m * z.diff() ** 2 / 2
-        + J * (theta.diff() ** 2 + phi.diff() ** 2) / 2
-        - m * g * z,
-        coordinates={z: "m", theta: "rad", phi: "rad"},
-        constraints=[legs[k] for k in order],
+    return point_mass(
+        "Plate",
+        "z",
+        [legs[k] for k in order],
+        angles="theta phi",
+        up=z,
+        energy=J * (theta.diff() ** 2 + phi.diff() ** 2) / 2,
         parameters=[
             MASS,
             GRAVITY,
@@ -78,11 +81,11 @@ def wedge(order: Sequence[int] = (0, 1), value: float = 0.0, angle: float = 1.0)
         Contact("left", x * c + z * s, restitution=e),
         Contact("right", -x * c + z * s, restitution=e),
     ]
-    return Model(
-        name="Wedge",
-        lagrangian=m * (x.diff() ** 2 + z.diff() ** 2) / 2 - m * g * z,
-        coordinates={x: "m", z: "m"},
-        constraints=[walls[k] for k in order],
+    return point_mass(
+        "Wedge",
+        "x z",
+        [walls[k] for k in order],
+        up=z,
         parameters=[MASS, GRAVITY, restitution(value)],
         start={x: 0.0, z: 1.0},
     )
@@ -119,11 +122,10 @@ def corner(order: Sequence[int] = (0, 1), value: float = 0.8, tilt: float = 0.0)
         Contact("floor", -x * s + z * c, restitution=e),
         Contact("wall", x * c + z * s, restitution=e),
     ]
-    return Model(
-        name="InTheCorner",
-        lagrangian=m * (x.diff() ** 2 + z.diff() ** 2) / 2,
-        coordinates={x: "m", z: "m"},
-        constraints=[walls[k] for k in order],
+    return point_mass(
+        "InTheCorner",
+        "x z",
+        [walls[k] for k in order],
         parameters=[MASS, restitution(value)],
         start={x: 1 / sqrt(2), z: 1 / sqrt(2), x.diff(): -1.0, z.diff(): -1.0},
     )

@@ -8,6 +8,7 @@ from typing import Any
 
 from sympy import S, cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
+from zoo import point_mass
 
 from lagfmu import Holonomic, Model, Parameter
 from lagfmu.bodies import Body, Ground, Revolute, mechanism
@@ -78,22 +79,18 @@ def hinged(n: int, axes: str) -> Model:
 def pinned_rod(start: Mapping[Any, float]) -> Model:
     """A uniform rod on a pivot in a vertical plane, in its angle and the place of its middle."""
     x, y, theta = dynamicsymbols("x y theta")
-    m, g, length = symbols("m g l", positive=True)
-    return Model(
-        name="PinnedRod",
-        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2
-        + m * length**2 * theta.diff() ** 2 / 24
-        - m * g * y,
-        coordinates={x: "m", y: "m", theta: "rad"},
-        constraints=[
+    m, length = symbols("m l", positive=True)
+    return point_mass(
+        "PinnedRod",
+        "x y",
+        [
             Holonomic("pinx", x - length / 2 * cos(theta)),
             Holonomic("piny", y - length / 2 * sin(theta)),
         ],
-        parameters=[
-            Parameter(m, 1.0, "kg"),
-            Parameter(g, 9.81, "m/s^2"),
-            Parameter(length, 1.5, "m"),
-        ],
+        angles="theta",
+        up=y,
+        energy=m * length**2 * theta.diff() ** 2 / 24,
+        parameters=[Parameter(length, 1.5, "m")],
         start=start,
     )
 

@@ -11,8 +11,9 @@ import pytest
 from redundant import platform
 from sympy import Abs, Piecewise, sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
+from zoo import point_mass
 
-from lagfmu import Model, Output, Parameter, Scene
+from lagfmu import Output, Parameter, Scene
 from lagfmu.bodies import Body, Gravity, Ground, Revolute, SpringDamper, Torsion, mechanism
 from lagfmu.testing import find_compiler, load
 
@@ -110,13 +111,13 @@ def test_a_slope_that_is_no_number_stays_with_its_output(library3, built):
     """At rest the speed sqrt(x'^2 + y'^2) has none by x' and y', and others have theirs; of two cases the one
     that holds is differentiated: d sqrt(x)/dx at x = 0 is in the other."""
     x, y = dynamicsymbols("x y")
-    m, k, L = symbols("m k L", positive=True)
+    k, L = symbols("k L", positive=True)
     root = Piecewise((x, x < L), (sqrt(L * (x - L)), True))
-    model = Model(
-        name="Corner",
-        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2 - k * root**2 / 2,
-        coordinates={x: "m", y: "m"},
-        parameters=[Parameter(m, 1, "kg"), Parameter(k, 2, "N/m"), Parameter(L, 1, "m")],
+    model = point_mass(
+        "Corner",
+        "x y",
+        energy=-k * root**2 / 2,
+        parameters=[Parameter(k, 2, "N/m"), Parameter(L, 1, "m")],
         start={x: 0.5, y: 0.0},
         outputs=[
             Output("speed", sqrt(x.diff() ** 2 + y.diff() ** 2), "m/s"),
@@ -138,13 +139,12 @@ def test_a_force_of_infinite_slope_is_told_and_its_neighbours_have_theirs(librar
     """m x'' = -k sqrt(L |x|), whose slope at x = 0 is infinite, beside m y'' = -k y, which the same step
     of the chain rule asks: d x''/dx is refused, d y''/dy = -k/m."""
     x, y = dynamicsymbols("x y")
-    m, k, L = symbols("m k L", positive=True)
-    model = Model(
-        name="Steep",
-        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2,
+    k, L = symbols("k L", positive=True)
+    model = point_mass(
+        "Steep",
+        "x y",
+        parameters=[Parameter(k, 2, "N/m"), Parameter(L, 1, "m")],
         forces={x: -k * sqrt(L * Abs(x)), y: -k * y},
-        coordinates={x: "m", y: "m"},
-        parameters=[Parameter(m, 1, "kg"), Parameter(k, 2, "N/m"), Parameter(L, 1, "m")],
         start={x: 0.0, y: 0.5},
     )
     one = library3(built(model, Scene("Steep"), fmi=3))().start()

@@ -10,6 +10,7 @@ import pytest
 from single import DISCARD
 from sympy import Rational, cos, sin, sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
+from zoo import point_mass
 
 from lagfmu import Contact, Holonomic, Model, Parameter
 from lagfmu.testing import find_compiler
@@ -71,16 +72,18 @@ def test_a_fine_communication_step_sees_the_same_motion_in_between(library, meth
 def cycloid() -> Model:
     """A bead on a cycloid, whose arc's length 4 R sin(phi / 2) swings as a spring does."""
     x, z, phi = dynamicsymbols("x z phi")
-    m, g, R = symbols("m g R", positive=True)
-    return Model(
-        name="Cycloid",
-        lagrangian=m * (x.diff() ** 2 + z.diff() ** 2) / 2 - m * g * z,
-        coordinates={x: "m", z: "m", phi: "rad"},
-        constraints=[
+    R = symbols("R", positive=True)
+    return point_mass(
+        "Cycloid",
+        "x z",
+        [
             Holonomic("along", x - R * (phi + sin(phi))),
             Holonomic("up", z - R * (1 - cos(phi))),
         ],
-        parameters=[Parameter(m, 0.2, "kg"), Parameter(g, 9.81, "m/s^2"), Parameter(R, 0.5, "m")],
+        angles="phi",
+        up=z,
+        mass=0.2,
+        parameters=[Parameter(R, 0.5, "m")],
         start={phi: 2.0},
     )
 
@@ -186,19 +189,14 @@ def test_a_landing_ahead_is_invisible_until_its_time(library, step):
 def lifted() -> Model:
     """A ball lifted by a force that has no value deeper than 1 cm below the floor: P sqrt(y/l + 0.01)."""
     y = dynamicsymbols("y")
-    m, g, P, l = symbols("m g P l", positive=True)  # noqa: E741
-    return Model(
-        name="Lifted",
-        lagrangian=m * y.diff() ** 2 / 2 - m * g * y,
+    P, l = symbols("P l", positive=True)  # noqa: E741
+    return point_mass(
+        "Lifted",
+        "y",
+        [Contact("floor", y)],
+        up=y,
+        parameters=[Parameter(P, 3.0, "N"), Parameter(l, 1.0, "m")],
         forces={y: P * sqrt(y / l + Rational(1, 100))},
-        coordinates={y: "m"},
-        constraints=[Contact("floor", y)],
-        parameters=[
-            Parameter(m, 1.0, "kg"),
-            Parameter(g, 9.81, "m/s^2"),
-            Parameter(P, 3.0, "N"),
-            Parameter(l, 1.0, "m"),
-        ],
         start={y: 1.0},
     )
 
@@ -257,14 +255,13 @@ def candle() -> Model:
     """A bead on a line, driven by a force that ends with a root: nothing is defined after t = T."""
     t = dynamicsymbols._t
     x, y = dynamicsymbols("x y")
-    m, P, T = symbols("m P T", positive=True)
-    return Model(
-        name="Candle",
-        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2,
+    P, T = symbols("P T", positive=True)
+    return point_mass(
+        "Candle",
+        "x y",
+        [Holonomic("line", y - x)],
+        parameters=[Parameter(P, 3.0, "N"), Parameter(T, 1.0, "s")],
         forces={x: P * sqrt(1 - t / T)},
-        coordinates={x: "m", y: "m"},
-        constraints=[Holonomic("line", y - x)],
-        parameters=[Parameter(m, 1.0, "kg"), Parameter(P, 3.0, "N"), Parameter(T, 1.0, "s")],
         start={x: 1.0, y: 1.0},
     )
 

@@ -11,13 +11,12 @@ from fmpy import read_model_description
 from sympy import symbols
 from sympy.physics.mechanics import dynamicsymbols
 from typer.testing import CliRunner
+from zoo import point_mass
 
 import lagfmu
 from lagfmu import (
     ClosedForm,
     Contact,
-    Model,
-    Parameter,
     Scene,
     VerificationError,
     build_fmu,
@@ -29,13 +28,7 @@ from lagfmu.testing import NoCompilerWarning, app, load, target_in, targets
 
 m, g = symbols("m g", positive=True)
 z = dynamicsymbols("z")
-RESTING = Model(
-    name="Resting",
-    lagrangian=m * z.diff() ** 2 / 2 - m * g * z,
-    coordinates={z: "m"},
-    constraints=[Contact("floor", z)],
-    parameters=[Parameter(m, 2.0, "kg"), Parameter(g, 9.81, "m/s^2")],
-)
+RESTING = point_mass("Resting", "z", [Contact("floor", z)], up=z, mass=2.0)
 WEIGHT = ClosedForm("lambda.floor", m * g)
 
 

@@ -22,6 +22,7 @@ from rich.console import Console
 from sympy import Abs, Eq, I, Matrix, Max, Piecewise, cos, exp, oo, sin, sqrt, symbols
 from sympy.physics.mechanics import ReferenceFrame, dynamicsymbols
 from typer.testing import CliRunner
+from zoo import point_mass
 
 from lagfmu import (
     Contact,
@@ -994,16 +995,16 @@ def test_parameters_that_make_the_start_impossible_are_refused_by_name(fmu):
 def test_what_cannot_be_computed_is_said_in_plain_words(tmp_path, target):
     """exp(1e4) is no double, and sqrt(x) no real number at x = -1: neither Python's errno nor a NaN."""
     x = dynamicsymbols("x")
-    m, k, a = symbols("m k a", positive=True)
+    k, a = symbols("k a", positive=True)
     for name, potential, place, words in (
         ("Steep", exp(x / a), 1e4, "beyond 1.8e308"),
         ("Root", sqrt(x / a), -1.0, "outside of its domain"),
     ):
-        model = Model(
-            name=name,
-            lagrangian=m * x.diff() ** 2 / 2 - k * potential,
-            coordinates={x: "m"},
-            parameters=[Parameter(m, 1.0, "kg"), Parameter(k, 1.0, "J"), Parameter(a, 1.0, "m")],
+        model = point_mass(
+            name,
+            "x",
+            energy=-k * potential,
+            parameters=[Parameter(k, 1.0, "J"), Parameter(a, 1.0, "m")],
             start={x: 1.0},
         )
         path = build_fmu(model, tmp_path, target=target, check=False)

@@ -11,37 +11,32 @@ from fmi2 import CO_SIMULATION, EXCHANGE, Library
 from single import OK
 from sympy import cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
+from zoo import point_mass
 
 from lagfmu import Contact, Holonomic, Input, Model, Parameter, derive
 
 t = dynamicsymbols._t
 x, y, F = dynamicsymbols("x y F")
-m, g, k, c = symbols("m g k c", positive=True)
+m, k, c = symbols("m k c", positive=True)
 
 
 @pytest.fixture
 def pushed(built, library) -> Library:
     """m x'' = F."""
-    model = Model(
-        name="Pushed",
-        lagrangian=m * x.diff() ** 2 / 2,
-        forces={x: F},
-        coordinates={x: "m"},
-        inputs=[Input(F, "N")],
-        parameters=[Parameter(m, 2.0, "kg")],
-    )
+    model = point_mass("Pushed", "x", mass=2.0, forces={x: F}, inputs=[Input(F, "N")])
     return library(built(model))
 
 
 @pytest.fixture
 def ledges(built, library) -> Library:
     """Two balls over ground at 0, of e = 0 and e = 1: each falls freely and lands at its own time."""
-    model = Model(
-        name="Ledges",
-        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2 - m * g * (x + y),
-        coordinates={x: "m", y: "m"},
-        constraints=[Contact("first", x), Contact("second", y, restitution=1)],
-        parameters=[Parameter(m, 2.0, "kg"), Parameter(g, 10.0, "m/s^2")],
+    model = point_mass(
+        "Ledges",
+        "x y",
+        [Contact("first", x), Contact("second", y, restitution=1)],
+        up=x + y,
+        mass=2.0,
+        gravity=10.0,
         start={x: 0.21, y: 0.2},
     )
     return library(built(model))

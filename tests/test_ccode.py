@@ -20,6 +20,7 @@ import sympy as sp
 from conftest import FILES
 from runtime import FLAGS, INCLUDES, RUNTIME_FILES, compile_library, compiler
 from sympy.physics.mechanics import dynamicsymbols
+from zoo import point_mass
 
 from lagfmu import (
     Contact,
@@ -665,21 +666,21 @@ def driven(formulation: str, folder: Path) -> Case:
     x, y, theta, u, force = dynamicsymbols("x y theta u F")
     m, g, L, e = sp.symbols("m g L e", positive=True)
     w = sp.Symbol("w", real=True)
-    model = Model(
-        name="Driven",
-        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2 - m * g * y,
-        coordinates={x: "m", y: "m"},
-        forces={x: force * sp.cos(w * TIME)},
-        constraints=[
+    model = point_mass(
+        "Driven",
+        "x y",
+        [
             Holonomic("rod", (x - u) ** 2 + y**2 - L**2),
             Contact("floor", y + 2 * L * (1 + sp.sin(w * TIME) / 10), restitution=e / (1 + e)),
             Holonomic("stuck", x - 3 * L, while_closed="floor"),
         ],
-        inputs=[Input(force, "N"), Input(u, "m")],
+        up=y,
         parameters=[
             *(Parameter(m, 1, "kg"), Parameter(g, 9.81, "m/s^2"), Parameter(L, 1, "m")),
             *(Parameter(e, 0.5, "1"), Parameter(w, 3, "rad/s")),
         ],
+        forces={x: force * sp.cos(w * TIME)},
+        inputs=[Input(force, "N"), Input(u, "m")],
         embedding=Embedding(
             coordinates={theta: "rad"},
             relations={x: u + L * sp.sin(theta), y: -L * sp.cos(theta)},

@@ -14,6 +14,7 @@ from instance import instance
 from runs import simulate_fmu
 from sympy import symbols
 from sympy.physics.mechanics import dynamicsymbols
+from zoo import point_mass
 
 from lagfmu import Contact, Friction, Model, Nonholonomic, Parameter, Scene, multiplier, sweep
 from lagfmu.errors import ModelError
@@ -127,11 +128,11 @@ def test_an_impact_goes_through_what_is_closed(built: Any) -> None:
     """A ball falls onto a block that lies on the floor: both contacts take m (1 + e) v at one instant, and
     the block, which stays, has been struck too; that its contact was closed at the start does not count."""
     a, b = dynamicsymbols("a b")
-    model = Model(
-        name="Stack",
-        lagrangian=m * (a.diff() ** 2 + b.diff() ** 2) / 2 - m * g * (a + b),
-        coordinates={a: "m", b: "m"},
-        constraints=[Contact("floor", b), Contact("meeting", a - b, restitution=0.5)],
+    model = point_mass(
+        "Stack",
+        "a b",
+        [Contact("floor", b), Contact("meeting", a - b, restitution=0.5)],
+        up=a + b,
         parameters=CONSTANTS,
         start={a: 1.0},
     )
@@ -150,15 +151,15 @@ def test_an_impact_goes_through_what_is_closed(built: Any) -> None:
 
 def test_a_landing_may_stick_at_once(built: Any) -> None:
     """A block that falls straight down onto rough ground sticks when it lands, at the same instant."""
-    model = Model(
-        name="Drop",
-        lagrangian=m * (x.diff() ** 2 + z.diff() ** 2) / 2 - m * g * z,
-        coordinates={x: "m", z: "m"},
-        constraints=[
+    model = point_mass(
+        "Drop",
+        "x z",
+        [
             Contact("ground", z),
             Nonholonomic("hold", x.diff()),
             Friction("grip", of=["hold"], normal=multiplier("ground"), static=0.5),
         ],
+        up=z,
         parameters=CONSTANTS,
         start={z: 1.0},
     )

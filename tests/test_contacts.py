@@ -9,6 +9,7 @@ from fmpy.fmi1 import FMICallException
 from instance import instance
 from sympy import Rational, cos, pi, sin, sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
+from zoo import point_mass
 
 from lagfmu import Contact, Holonomic, Model, Nonholonomic, Parameter, simulate
 
@@ -161,14 +162,16 @@ def test_a_foot_too_far_out_for_a_double_is_refused_by_name(built):
     start is refused (a step began with the wrong contacts); a plate of 1 m stands on both alike."""
     z, lean = dynamicsymbols("z lean")
     half = symbols("b", positive=True)
-    plate = Model(
-        name="Plate",
-        lagrangian=m * z.diff() ** 2 / 2 + m * a**2 * lean.diff() ** 2 / 2 - m * g * z,
-        coordinates={z: "m", lean: "rad"},
-        constraints=[
+    plate = point_mass(
+        "Plate",
+        "z",
+        [
             Contact("left", z - half * sin(lean)),
             Contact("right", z + half * sin(lean)),
         ],
+        angles="lean",
+        up=z,
+        energy=m * a**2 * lean.diff() ** 2 / 2,
         parameters=[MASS, GRAVITY, Parameter(a, 1.0, "m"), Parameter(half, 1.0, "m")],
         start={z: 0.0, lean: 0.0},
     )

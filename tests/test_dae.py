@@ -17,6 +17,7 @@ from linkages import FOUR_BAR, rods
 from sympy import sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 from test_forged_states import HEAD, forged
+from zoo import point_mass
 
 from lagfmu import (
     Contact,
@@ -42,16 +43,14 @@ t = dynamicsymbols._t
 MASS, GRAVITY, LENGTH = 2.0, 9.81, 1.5
 ENABLE = "solver.dae"
 
-pendulum = Model(
-    name="Pendulum",
-    lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2 - m * g * y,
-    coordinates={x: "m", y: "m"},
-    constraints=[Holonomic("rod", (x**2 + y**2 - L**2) / 2)],
-    parameters=[
-        Parameter(m, MASS, "kg"),
-        Parameter(g, GRAVITY, "m/s^2"),
-        Parameter(L, LENGTH, "m"),
-    ],
+pendulum = point_mass(
+    "Pendulum",
+    "x y",
+    [Holonomic("rod", (x**2 + y**2 - L**2) / 2)],
+    up=y,
+    mass=MASS,
+    gravity=GRAVITY,
+    parameters=[Parameter(L, LENGTH, "m")],
     start={x: 0.9, y: -1.2, x.diff(): 0.8, y.diff(): 0.6},
 )
 sleigh = Model(  # a knife edge, its heading turned by an input
@@ -692,12 +691,7 @@ def test_a_friction_whose_normal_force_is_shared_is_refused(tmp_path):
 
 def test_without_constraints_there_is_nothing_to_solve_for(tmp_path):
     """A falling mass."""
-    falling = Model(
-        name="Falling",
-        lagrangian=m * y.diff() ** 2 / 2 - m * g * y,
-        coordinates={y: "m"},
-        parameters=pendulum.parameters[:2],
-    )
+    falling = point_mass("Falling", "y", up=y, parameters=pendulum.parameters[:2])
     assert "no constraint" in refused(falling, tmp_path)
 
 

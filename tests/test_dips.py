@@ -10,8 +10,9 @@ import pytest
 from instance import instance
 from sympy import cos, exp, sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
+from zoo import point_mass
 
-from lagfmu import Contact, Model, Parameter
+from lagfmu import Contact, Parameter
 
 x, y = dynamicsymbols("x y")
 m, a, H, w, R = symbols("m a H w R", positive=True)
@@ -20,12 +21,12 @@ PULL = 9.81  # m/s^2, upwards: a flight that dips and comes back
 
 def flight(name, constraint, parameters, pull=0, **start):
     """A particle of 1 kg under the acceleration `pull` upwards, over an obstacle without friction, e = 1."""
-    return Model(
-        name=name,
-        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2 + m * pull * y,
-        coordinates={x: "m", y: "m"},
-        constraints=[constraint],
-        parameters=[Parameter(m, 1.0, "kg"), *parameters],
+    return point_mass(
+        name,
+        "x y",
+        [constraint],
+        energy=m * pull * y,
+        parameters=[*parameters],
         start={x: -0.5, y: 0.0, **start},
     )
 
@@ -122,18 +123,14 @@ def test_a_miss_stays_a_miss(built):
 def test_a_narrow_bump_at_the_turn_of_a_flight_is_hit(built):
     """A particle that is thrown up to v^2/(2 g) turns round in a bump a thousandth as wide: between two
     samples it goes beyond both, and beyond the one in the middle, by what its path bends."""
-    h, g = symbols("h g", positive=True)
-    model = Model(
-        name="Turn",
-        lagrangian=m * y.diff() ** 2 / 2 - m * g * y,
-        coordinates={y: "m"},
-        constraints=[Contact("bump", w - 2 * w * exp(-(((y - h) / w) ** 2)))],
-        parameters=[
-            Parameter(m, 1.0, "kg"),
-            Parameter(g, PULL, "m/s^2"),
-            Parameter(w, 1e-4, "m"),
-            Parameter(h, 0.2, "m"),
-        ],
+    h = symbols("h", positive=True)
+    model = point_mass(
+        "Turn",
+        "y",
+        [Contact("bump", w - 2 * w * exp(-(((y - h) / w) ** 2)))],
+        up=y,
+        gravity=PULL,
+        parameters=[Parameter(w, 1e-4, "m"), Parameter(h, 0.2, "m")],
         start={y.diff(): 2.0},
     )
     with instance(built(model)) as one:

@@ -8,6 +8,7 @@ import pytest
 from instance import instance
 from sympy import symbols
 from sympy.physics.mechanics import dynamicsymbols
+from zoo import point_mass
 
 from lagfmu import Contact, Input, Model, Parameter
 
@@ -19,12 +20,13 @@ m, g = symbols("m g", positive=True)
 @pytest.fixture
 def driven(built):
     """The FMU of a block of 2 kg on a table at the height u."""
-    model = Model(
-        name="Driven",
-        lagrangian=m * y.diff() ** 2 / 2 - m * g * y,
-        coordinates={y: "m"},
-        constraints=[Contact("table", y - u)],
-        parameters=[Parameter(m, 2.0, "kg"), Parameter(g, G, "m/s^2")],
+    model = point_mass(
+        "Driven",
+        "y",
+        [Contact("table", y - u)],
+        up=y,
+        mass=2.0,
+        gravity=G,
         inputs=[Input(u, "m")],
         start={y: 0.0},
     )

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from sympy import cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
+from zoo import point_mass
 
 from lagfmu import Contact, Friction, Model, Nonholonomic, Parameter, Scene, multiplier, simulate
 
@@ -19,22 +20,17 @@ t, FALL = dynamicsymbols._t, 9.81  # s, m/s^2
 
 def puck(floor: float = 0.0, height: float = 1.0) -> Model:
     """A puck, mu = 0.3 and e = 0.5, thrown at 10 m/s above a rough floor."""
-    return Model(
-        name="RoughBounce",
-        lagrangian=m * (x.diff() ** 2 + z.diff() ** 2) / 2 - m * g * z,
-        coordinates={x: "m", z: "m"},
-        constraints=[
+    return point_mass(
+        "RoughBounce",
+        "x z",
+        [
             Contact("floor", z - X0, restitution=e),
             Nonholonomic("rub", x.diff(), while_closed="floor"),
             Friction("grip", of=["rub"], normal=multiplier("floor"), static=mu),
         ],
-        parameters=[
-            Parameter(m, 1.0, "kg"),
-            Parameter(g, FALL, "m/s^2"),
-            Parameter(e, 0.5, "1"),
-            Parameter(mu, 0.3, "1"),
-            Parameter(X0, floor, "m"),
-        ],
+        up=z,
+        gravity=FALL,
+        parameters=[Parameter(e, 0.5, "1"), Parameter(mu, 0.3, "1"), Parameter(X0, floor, "m")],
         start={x: 0.0, z: floor + height, x.diff(): 10.0},
     )
 

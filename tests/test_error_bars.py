@@ -22,8 +22,9 @@ from scipy.special import ellipj, ellipk
 from sympy import sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
 from typer.testing import CliRunner
+from zoo import point_mass
 
-from lagfmu import Model, Output, Parameter, Scene, simulate, sweep
+from lagfmu import Output, Parameter, Scene, simulate, sweep
 from lagfmu.errors import SimulationError
 from lagfmu.names import bar as bar_of
 from lagfmu.testing import LAST, ErrorBarWarning, Plan, Session, app, figure_of, prepare, run_batch
@@ -236,12 +237,12 @@ def test_between_the_two_departures_the_bars_are_infinite(barred):
 def root(built: Any) -> Path:
     """A mass on a spring by rk4, and an output that is not defined beyond x = d: two steps from x = 1 to the
     middle end 5 mm short of it, the four of the finer run 0.3 mm."""
-    x, (m, k, d) = dynamicsymbols("x"), symbols("m k d", positive=True)
-    model = Model(
-        name="Root",
-        lagrangian=m * x.diff() ** 2 / 2 - k * x**2 / 2,
-        coordinates={x: "m"},
-        parameters=[Parameter(m, 1.0, "kg"), Parameter(k, 1.0, "N/m"), Parameter(d, 2e-3, "m")],
+    x, (k, d) = dynamicsymbols("x"), symbols("k d", positive=True)
+    model = point_mass(
+        "Root",
+        "x",
+        energy=-k * x**2 / 2,
+        parameters=[Parameter(k, 1.0, "N/m"), Parameter(d, 2e-3, "m")],
         outputs=[Output("root", sqrt((x - d) / d), "1")],
         start={x: 1.0},
     )

@@ -12,6 +12,7 @@ from fmi2 import EventInfo, Library, Single
 from sympy import Rational, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 from test_jumps import lifted
+from zoo import point_mass
 
 from lagfmu import Contact, Holonomic, Input, Model, Parameter
 from lagfmu.testing import prepare
@@ -25,13 +26,13 @@ MASS, GRAVITY = Parameter(m, 2.0, "kg"), Parameter(g, G, "m/s^2")
 
 def shaken() -> Model:
     """A block pushed by A sin(w t), over a table that an importer moves."""
-    return Model(
-        name="Shaken",
-        lagrangian=m * y.diff() ** 2 / 2 - m * g * y,
-        forces={y: A * sin(w * t)},
-        coordinates={y: "m"},
-        constraints=[Contact("table", y - u)],
+    return point_mass(
+        "Shaken",
+        "y",
+        [Contact("table", y - u)],
+        up=y,
         parameters=[MASS, GRAVITY, Parameter(A, 3.0, "N"), Parameter(w, 2.0, "rad/s")],
+        forces={y: A * sin(w * t)},
         inputs=[Input(u, "m")],
         start={y: 1.0},
     )
@@ -39,16 +40,16 @@ def shaken() -> Model:
 
 def ball() -> Model:
     """A ball that rolls once it lies on the floor, which falls by a tenth."""
-    return Model(
-        name="Lander",
-        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2
-        + Rational(1, 5) * m * R**2 * phi.diff() ** 2
-        - m * g * (y - x / 10),
-        coordinates={x: "m", y: "m", phi: "rad"},
-        constraints=[
+    return point_mass(
+        "Lander",
+        "x y",
+        [
             Contact("floor", y - R),
             Holonomic("rolling", x - R * phi, while_closed="floor"),
         ],
+        angles="phi",
+        up=y - x / 10,
+        energy=Rational(1, 5) * m * R**2 * phi.diff() ** 2,
         parameters=[MASS, GRAVITY, Parameter(R, RADIUS, "m")],
         start={x: 0.5, y: 1.0, phi: 0.3},
     )

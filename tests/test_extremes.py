@@ -26,6 +26,7 @@ from instance import Instance, instance
 from single import DISCARD, ERROR, OK
 from sympy import cos, sin, sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
+from zoo import point_mass
 
 from lagfmu import Holonomic, Input, Model, Parameter, names, simulate
 
@@ -279,13 +280,13 @@ def test_a_motion_is_as_quick_as_doubles_can_say(built):
     """x = cos(w t) at w = 1e150 /s, whose accelerations squared are beyond a double.  From t = 1 s on, where
     no double is that near to another, the step is refused, and the reason names it (it said: shorter)."""
     k, u = symbols("k", positive=True), dynamicsymbols("u")
-    spring = Model(
-        name="Spring",
+    spring = point_mass(
+        "Spring",
+        "x",
+        energy=-k * x**2 / 2,
+        parameters=[Parameter(k, 1e300, "N/m")],
         forces={x: u},
         inputs=[Input(u, "N")],
-        lagrangian=m * x.diff() ** 2 / 2 - k * x**2 / 2,
-        coordinates={x: "m"},
-        parameters=[Parameter(m, 1.0, "kg"), Parameter(k, 1e300, "N/m")],
         start={x: 1.0},
     )
     with instance(built(spring)) as one:
@@ -345,8 +346,7 @@ def test_a_constraint_given_several_times_shares_its_force_equally(built, factor
             assert b[n] == pytest.approx(a[n], abs=1e-8), n
 
 
-beta = dynamicsymbols("beta")
-a_, J = symbols("a J", positive=True)
+J = symbols("J", positive=True)
 
 
 alpha = symbols("alpha", positive=True)
@@ -356,20 +356,16 @@ R = symbols("R", positive=True)
 def groove() -> Model:
     """A bead on the line x in which two cylinders z = x^2/(2 R) meet, turned by alpha about x."""
     valley = z - x**2 / (2 * R)
-    return Model(
-        name="Groove",
-        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2 + z.diff() ** 2) / 2 - m * g * (z + y / 2),
-        coordinates={x: "m", y: "m", z: "m"},
-        constraints=[
+    return point_mass(
+        "Groove",
+        "x y z",
+        [
             Holonomic("floor", valley),
             Holonomic("wall", valley * cos(alpha) + y * sin(alpha)),
         ],
-        parameters=[
-            Parameter(m, 1.0, "kg"),
-            Parameter(g, g0, "m/s^2"),
-            Parameter(R, 1.0, "m"),
-            Parameter(alpha, 0.1, "rad"),
-        ],
+        up=z + y / 2,
+        gravity=g0,
+        parameters=[Parameter(R, 1.0, "m"), Parameter(alpha, 0.1, "rad")],
         start={x: 0.5, y: 0.0, z: 0.125},
     )
 
@@ -744,12 +740,11 @@ def test_a_place_near_zero_is_projected_to_rounding_of_the_terms(built, amplitud
 def reeled() -> Model:
     """A mass on a string that is reeled in at c: at t = L/c it has no length, and G = (2 x, 2 y) vanishes."""
     c = symbols("c", positive=True)
-    return Model(
-        name="Reeled",
-        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2,
-        coordinates={x: "m", y: "m"},
-        constraints=[Holonomic("string", x**2 + y**2 - (L - c * dynamicsymbols._t) ** 2)],
-        parameters=[Parameter(m, 1.0, "kg"), Parameter(L, 1.0, "m"), Parameter(c, 1.0, "m/s")],
+    return point_mass(
+        "Reeled",
+        "x y",
+        [Holonomic("string", x**2 + y**2 - (L - c * dynamicsymbols._t) ** 2)],
+        parameters=[Parameter(L, 1.0, "m"), Parameter(c, 1.0, "m/s")],
         start={x: 1.0, y: 0.0, x.diff(): -1.0, y.diff(): 0.0},
     )
 

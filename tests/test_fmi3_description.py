@@ -11,10 +11,10 @@ import pytest
 from conftest import of_each_kind
 from fmpy.validation import validate_fmu
 from lxml import etree
-from sympy import symbols
 from sympy.physics.mechanics import dynamicsymbols
+from zoo import point_mass
 
-from lagfmu import Holonomic, Model, Parameter, Scene
+from lagfmu import Holonomic, Scene
 from lagfmu.errors import ModelError, UsageError
 from lagfmu.testing import (
     Face,
@@ -129,14 +129,8 @@ def test_what_is_not_there_is_refused_by_name(tmp_path: Path) -> None:
         Face(2, clocks=True, arrays=True)
     with pytest.raises(UsageError, match="fmi = 1 is no version that is known, expected 2 or 3"):
         Face(1)
-    x, m = dynamicsymbols("x"), symbols("m", positive=True)
-    model = Model(
-        name="Held",
-        lagrangian=m * x.diff() ** 2 / 2,
-        coordinates={x: "m"},
-        constraints=[Holonomic("N", x)],
-        parameters=[Parameter(m, 1.0, "kg")],
-    )
+    x = dynamicsymbols("x")
+    model = point_mass("Held", "x", [Holonomic("N", x)])
     with pytest.raises(UsageError, match=r"the target python has FMI 2\.0 alone"):
         write(prepare(model), tmp_path, target="python", face=Face(3))
     with pytest.raises(ModelError, match=r"two variables of the FMU would be called 'lambda\.N'"):

@@ -19,8 +19,9 @@ from fmi3 import Single
 from single import ERROR
 from sympy.physics.mechanics import dynamicsymbols
 from test_jumps import MODELS as JUMPS
+from zoo import point_mass
 
-from lagfmu import Contact, Input, Model, Parameter
+from lagfmu import Contact, Input, Model
 from lagfmu.testing import find_compiler
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler on this machine")
@@ -144,13 +145,10 @@ def test_each_bounce_is_a_point_with_two_sides(library3, events, early):
 def corner() -> Model:
     """A ball between two walls, without gravity."""
     x, y = dynamicsymbols("x y")
-    m = sympy.symbols("m")
-    return Model(
-        name="Corner",
-        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2,
-        coordinates={x: "m", y: "m"},
-        constraints=[Contact("left", x, restitution=0.5), Contact("floor", y, restitution=0.8)],
-        parameters=[Parameter(m, 1.0, "kg")],
+    return point_mass(
+        "Corner",
+        "x y",
+        [Contact("left", x, restitution=0.5), Contact("floor", y, restitution=0.8)],
         start={x: 0.3, y: 0.1, x.diff(): -3.0, y.diff(): -1.0},
     )
 
@@ -256,13 +254,13 @@ def _in_event_mode(lib, one):
 def lifted() -> Model:
     """A block on the floor, under a force F that is set."""
     y = dynamicsymbols("y")
-    m, g, F = sympy.symbols("m g F")
-    return Model(
-        name="LiftedBlock",
-        lagrangian=m * y.diff() ** 2 / 2 - m * g * y,
-        coordinates={y: "m"},
-        constraints=[Contact("floor", y)],
-        parameters=[Parameter(m, 2.0, "kg"), Parameter(g, 9.81, "m/s^2")],
+    F = sympy.symbols("F")
+    return point_mass(
+        "LiftedBlock",
+        "y",
+        [Contact("floor", y)],
+        up=y,
+        mass=2.0,
         inputs=[Input(F, "N")],
         forces={y: F},
     )

@@ -19,6 +19,7 @@ from fmpy.validation import validate_fmu
 from instance import instance
 from sympy import Rational, cos, symbols
 from sympy.physics.mechanics import dynamicsymbols
+from zoo import point_mass
 
 from lagfmu import Contact, Holonomic, Input, Model, Nonholonomic, Parameter, Scene, build_fmu
 from lagfmu.testing import described, name_of
@@ -321,11 +322,9 @@ def test_dependencies_say_of_what_kind_they_are(xml):
 def test_dependencies_are_left_out_where_they_would_be_too_many(tmp_path, monkeypatch, caplog):
     """In a large mechanism all depends on all: no attribute `dependencies`, which means that for FMI, and the
     build says so."""
-    x, m = dynamicsymbols("x"), symbols("m", positive=True)
+    m = symbols("m", positive=True)
     parameters = [Parameter(m, 1.0, "kg")]
-    free = Model(
-        "Free", lagrangian=m * x.diff() ** 2 / 2, coordinates={x: "m"}, parameters=parameters
-    )
+    free = point_mass("Free", "x", parameters=parameters)
     caplog.set_level("INFO", "lagfmu")
     for most, told in ((100, 0), (3, 1)):
         monkeypatch.setattr(described, "MOST", most)
@@ -417,12 +416,13 @@ def test_start_values_in_the_description_are_those_of_the_binary(path, xml):
 
 def test_awkward_start_values_survive(tmp_path):
     """0.1 + 0.2, 1/3 and 1e-300 come back bit for bit from the text and from the binary."""
-    x, m, k = dynamicsymbols("x"), symbols("m", positive=True), symbols("k", real=True)
-    model = Model(
-        name="Awkward",
-        lagrangian=m * x.diff() ** 2 / 2 - k * x,
-        coordinates={x: "m"},
-        parameters=[Parameter(m, Rational(1, 3), "kg"), Parameter(k, 1e-300, "N")],
+    x, k = dynamicsymbols("x"), symbols("k", real=True)
+    model = point_mass(
+        "Awkward",
+        "x",
+        energy=-k * x,
+        mass=Rational(1, 3),
+        parameters=[Parameter(k, 1e-300, "N")],
         start={x: 0.1 + 0.2, x.diff(): -2 / 3},
     )
     path = build_fmu(model, tmp_path, check=False)
@@ -721,21 +721,17 @@ def test_constraints_that_mix_give_every_variable_its_dependencies(tmp_path):
     checker complains about."""
     t = dynamicsymbols._t
     x, y, z, u = dynamicsymbols("x y z u")
-    m, w, g = symbols("m w g", positive=True)
-    model = Model(
-        name="Mixed",
-        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2 + z.diff() ** 2) / 2 - m * g * z,
-        coordinates={x: "m", y: "m", z: "m"},
-        constraints=[
+    w, g = symbols("w g", positive=True)
+    model = point_mass(
+        "Mixed",
+        "x y z",
+        [
             Contact("floor", z - u),
             Nonholonomic("steer", x.diff() * cos(w * t) - y.diff()),
             Holonomic("rail", x - w * t * g / w**2, while_closed="floor"),
         ],
-        parameters=[
-            Parameter(m, 1.0, "kg"),
-            Parameter(w, 1.0, "rad/s"),
-            Parameter(g, 9.81, "m/s^2"),
-        ],
+        up=z,
+        parameters=[Parameter(w, 1.0, "rad/s")],
         inputs=[Input(u, "m")],
         start={x.diff(): 9.81, y.diff(): 9.81},
     )

@@ -11,8 +11,9 @@ import pytest
 import sympy as sp
 from hypothesis import given
 from hypothesis import strategies as st
+from zoo import point_mass
 
-from lagfmu import ClosedForm, Holonomic, Model, Parameter, Scene, output, verify
+from lagfmu import ClosedForm, Holonomic, Parameter, Scene, output, verify
 from lagfmu.errors import ModelError, VerificationError
 from lagfmu.testing import (
     LONGEST_SUM,
@@ -222,14 +223,9 @@ def test_deeply_nested_json_is_refused():
 def test_a_closed_form_that_no_fmu_can_carry_is_refused_when_it_is_built():
     """What would not be read back is not written: the function is named."""
     q = sp.physics.mechanics.dynamicsymbols("q")
-    m, L = sp.symbols("m L", positive=True)
-    model = Model(
-        name="Mass",
-        lagrangian=m * q.diff() ** 2 / 2,
-        coordinates={q: "m"},
-        constraints=[Holonomic("pin", q - L)],
-        parameters=[Parameter(m, 1.0, "kg"), Parameter(L, 1.0, "m")],
-        start={q: 1.0},
+    L = sp.symbols("L", positive=True)
+    model = point_mass(
+        "Mass", "q", [Holonomic("pin", q - L)], parameters=[Parameter(L, 1.0, "m")], start={q: 1.0}
     )
     prepared = prepare(model, Scene("Mass"))
     form = ClosedForm("q", sp.zeta(output("L")))

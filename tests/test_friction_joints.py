@@ -16,6 +16,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 from sympy import cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
+from zoo import point_mass
 
 from lagfmu import (
     Contact,
@@ -39,25 +40,25 @@ MODELS = Path(__file__).parent.parent / "models"
 Build = Callable[..., Path]
 g = 9.81  # m/s^2
 x, y, z, theta, phi = dynamicsymbols("x y z theta phi")
-m, M, G, L, J, r, b, h, P = symbols("m M g L J r b h P", positive=True)
+m, G, L, J, r, b, h, P = symbols("m g L J r b h P", positive=True)
 mu, mu_s, mu_k = symbols("mu mu_s mu_k", positive=True)
 
 
 def pendulum(normal: Any, static: Any, kinetic: Any = None, *more: Any) -> Model:
     """A compound pendulum, its pin as two rows: 1 kg, 0.5 m below the pin, 0.05 kg m^2 about its centre."""
-    return Model(
-        name="Pin",
-        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2 + J * theta.diff() ** 2 / 2 - m * G * y,
-        coordinates={x: "m", y: "m", theta: "rad"},
-        constraints=[
+    return point_mass(
+        "Pin",
+        "x y",
+        [
             Holonomic("A.x", x - L * sin(theta)),
             Holonomic("A.y", y + L * cos(theta)),
             Nonholonomic("turn", theta.diff()),
             *more,
             Friction("bearing", of=["turn"], normal=normal, static=static, kinetic=kinetic),
         ],
+        angles="theta",
+        energy=J * theta.diff() ** 2 / 2 - m * G * y,
         parameters=[
-            Parameter(m, 1.0, "kg"),
             Parameter(G, g, "m/s^2"),
             Parameter(L, 0.5, "m"),
             Parameter(J, 0.05, "kg.m^2"),
@@ -241,24 +242,19 @@ def test_a_guide_rubs_by_the_norm_of_its_two_radial_forces(built: Build) -> None
     """A block thrown up a guide at alpha = 0.5, pressed sideways by P: N = sqrt((m g cos alpha)^2 + P^2); it
     stops after v0/(g sin alpha + mu N/m), slides back by a = g sin alpha - mu N/m, or stays."""
     alpha, m_, P_ = 0.5, 2.0, 7.0
-    model = Model(
-        name="Guide",
-        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2 + z.diff() ** 2) / 2
-        - m * G * (x * np.sin(alpha) + y * np.cos(alpha)),
-        coordinates={x: "m", y: "m", z: "m"},
-        forces={z: P},
-        constraints=[
+    model = point_mass(
+        "Guide",
+        "x y z",
+        [
             Holonomic("D.y", y),
             Holonomic("D.z", z),
             Nonholonomic("slide", x.diff()),
             Friction("guide", ["slide"], norm(multiplier("D.y"), multiplier("D.z")), mu),
         ],
-        parameters=[
-            Parameter(m, m_, "kg"),
-            Parameter(G, g, "m/s^2"),
-            Parameter(P, P_, "N"),
-            Parameter(mu, 0.3, "1"),
-        ],
+        energy=-m * G * (x * np.sin(alpha) + y * np.cos(alpha)),
+        mass=m_,
+        parameters=[Parameter(G, g, "m/s^2"), Parameter(P, P_, "N"), Parameter(mu, 0.3, "1")],
+        forces={z: P},
         start={x.diff(): 3.0},
     )
     N = np.hypot(m_ * g * np.cos(alpha), P_)
@@ -277,25 +273,26 @@ def test_a_drawer_jams_by_the_norms_at_both_edges(built: Build) -> None:
     """A drawer of length b in its guide, pulled by P at h from the centre line: the edges bear P h/b each,
     the friction is 2 mu P h/b, and it comes with a = P (1 - 2 mu h/b)/m, or jams where 2 mu h >= b."""
     edges = [multiplier("D.y") / 2 + s * multiplier("D.phi") / b for s in (1, -1)]
-    model = Model(
-        name="Drawer",
-        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2 + J * phi.diff() ** 2 / 2,
-        coordinates={x: "m", y: "m", phi: "rad"},
-        forces={x: P, phi: -P * h},
-        constraints=[
+    model = point_mass(
+        "Drawer",
+        "x y",
+        [
             Holonomic("D.y", y),
             Holonomic("D.phi", phi),
             Nonholonomic("slide", x.diff()),
             Friction("guide", ["slide"], norm(edges[0]) + norm(edges[1]), mu),
         ],
+        angles="phi",
+        energy=J * phi.diff() ** 2 / 2,
+        mass=2.0,
         parameters=[
-            Parameter(m, 2.0, "kg"),
             Parameter(J, 0.1, "kg.m^2"),
             Parameter(P, 10.0, "N"),
             Parameter(h, 0.3, "m"),
             Parameter(b, 0.4, "m"),
             Parameter(mu, 0.5, "1"),
         ],
+        forces={x: P, phi: -P * h},
     )
     run = simulate(built(model), stop_time=1.0, step_size=0.5)
     assert run["x"][-1] == pytest.approx(10.0 * (1 - 2 * 0.5 * 0.3 / 0.4) / 2.0 / 2, rel=1e-12)
@@ -307,27 +304,26 @@ def test_a_drawer_jams_by_the_norms_at_both_edges(built: Build) -> None:
 def test_a_sleeve_rubs_against_its_slip_vector(built: Build) -> None:
     """A tube of radius r slides and turns on a rod: lambda = -mu N (v, r omega)/|(v, r omega)|.  With
     J = m r^2 both decay alike, (v, r omega) by mu N/m along itself, and stop at |s|/(mu N/m)."""
-    model = Model(
-        name="Sleeve",
-        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2 + z.diff() ** 2) / 2
-        + m * r**2 * phi.diff() ** 2 / 2
-        - m * G * z,
-        coordinates={x: "m", y: "m", z: "m", phi: "rad"},
-        forces={y: P},
-        constraints=[
+    model = point_mass(
+        "Sleeve",
+        "x y z",
+        [
             Holonomic("C.y", y),
             Holonomic("C.z", z),
             Nonholonomic("slide", x.diff()),
             Nonholonomic("turn", r * phi.diff()),
             Friction("sleeve", ["slide", "turn"], norm(multiplier("C.y"), multiplier("C.z")), mu),
         ],
+        angles="phi",
+        energy=m * r**2 * phi.diff() ** 2 / 2 - m * G * z,
+        mass=1.5,
         parameters=[
-            Parameter(m, 1.5, "kg"),
             Parameter(r, 0.05, "m"),
             Parameter(G, g, "m/s^2"),
             Parameter(P, 5.0, "N"),
             Parameter(mu, 0.2, "1"),
         ],
+        forces={y: P},
         start={x.diff(): 0.3, phi.diff(): 8.0},
     )
     run = simulate(built(model), stop_time=0.4, step_size=0.01)

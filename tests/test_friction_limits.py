@@ -11,6 +11,7 @@ import pytest
 from scipy.optimize import brentq
 from sympy import exp, symbols
 from sympy.physics.mechanics import dynamicsymbols
+from zoo import point_mass
 
 from lagfmu import Friction, Input, Model, Nonholonomic, Parameter, simulate
 from lagfmu.bodies import Body, Gravity, Ground, Prismatic, Revolute, SpringDamper, mechanism
@@ -148,13 +149,13 @@ def test_a_limit_of_another_dimension_or_beside_a_normal_is_refused(
 ) -> None:
     """It is the force itself, in N."""
     with pytest.raises(ModelError, match=told):
-        Model(
-            name="B",
-            lagrangian=m * x.diff() ** 2 / 2 - F * x,
-            coordinates={x: "m"},
-            constraints=[
+        point_mass(
+            "B",
+            "x",
+            [
                 Nonholonomic("seal", x.diff()),
                 Friction("dry", ["seal"], limit=limit, **more),
             ],
-            parameters=[Parameter(m, 1.0, "kg"), Parameter(F, 1.0, "N")],
+            energy=-F * x,
+            parameters=[Parameter(F, 1.0, "N")],
         )

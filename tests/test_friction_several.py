@@ -18,6 +18,7 @@ from instance import instance
 from runs import simulate_fmu
 from sympy import Rational, cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
+from zoo import point_mass
 
 from lagfmu import (
     Contact,
@@ -38,28 +39,26 @@ from lagfmu.testing import Session, targets
 Built = Callable[..., Path]
 g = 9.81  # m/s^2
 x, y, z, theta, phi = dynamicsymbols("x y z theta phi")
-m, G, mu, alpha, a, h, J, e = symbols("m g mu alpha a h J e", nonnegative=True)
-mu_k = symbols("mu_k", nonnegative=True)
+m, G = symbols("m g", positive=True)
+mu, a, e = symbols("mu a e", nonnegative=True)
 rate, speed, clamp, force = symbols("w v N F")
 t = dynamicsymbols._t
-MASS = [Parameter(m, 1.0, "kg"), Parameter(G, g, "m/s^2")]
 
 
 def ball() -> Model:
     """A solid ball that is thrown onto the floor."""
-    return Model(
-        name="Ball",
-        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2
-        + Rational(1, 5) * m * a**2 * phi.diff() ** 2
-        - m * G * y,
-        coordinates={x: "m", y: "m", phi: "rad"},
-        constraints=[
+    return point_mass(
+        "Ball",
+        "x y",
+        [
             Contact("floor", y, restitution=e),
             Nonholonomic("rolling", x.diff() - a * phi.diff()),
             Friction("grip", of=["rolling"], normal=multiplier("floor"), static=mu),
         ],
+        angles="phi",
+        up=y,
+        energy=Rational(1, 5) * m * a**2 * phi.diff() ** 2,
         parameters=[
-            *MASS,
             Parameter(mu, 0.3, "1"),
             Parameter(a, 0.1, "m"),
             Parameter(e, 0.5, "1", min=0, max=1),
@@ -117,26 +116,25 @@ def test_a_puck_stops_in_both_directions_at_once(
 def whirled() -> Model:
     """A point mass on a rough table, under a force that turns round at the rate w."""
     along, aside = m * speed * rate, mu * m * G
-    return Model(
-        name="Whirled",
-        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2 + z.diff() ** 2) / 2 - m * G * z,
-        coordinates={x: "m", y: "m", z: "m"},
-        forces={
-            x: -along * cos(rate * t) - aside * sin(rate * t),
-            y: -along * sin(rate * t) + aside * cos(rate * t),
-        },
-        constraints=[
+    return point_mass(
+        "Whirled",
+        "x y z",
+        [
             Contact("table", z),
             Nonholonomic("along", x.diff()),
             Nonholonomic("across", y.diff()),
             Friction("grip", of=["along", "across"], normal=multiplier("table"), static=mu),
         ],
+        up=z,
         parameters=[
-            *MASS,
             Parameter(mu, 0.3, "1"),
             Parameter(speed, 1.5, "m/s"),
             Parameter(rate, 6.0, "rad/s"),
         ],
+        forces={
+            x: -along * cos(rate * t) - aside * sin(rate * t),
+            y: -along * sin(rate * t) + aside * cos(rate * t),
+        },
         start={x: 0.25, x.diff(): 0.0, y.diff(): 1.5},
     )
 
@@ -163,24 +161,22 @@ def test_a_slide_that_turns_round_does_not_end(built: Built, library: Any, metho
 
 def gripped() -> Model:
     """A block between two belts that are clamped onto it and set off at t = 0, the first stands."""
-    return Model(
-        name="Gripped",
-        lagrangian=m * x.diff() ** 2 / 2,
-        coordinates={x: "m"},
-        forces={x: force},
-        constraints=[
+    return point_mass(
+        "Gripped",
+        "x",
+        [
             Nonholonomic("under", x.diff()),
             Nonholonomic("over", x.diff() - rate * t),
             Friction("first", of=["under"], normal=clamp, static=mu),
             Friction("second", of=["over"], normal=clamp, static=mu),
         ],
         parameters=[
-            MASS[0],
             Parameter(mu, 0.5, "1"),
             Parameter(clamp, 2.0, "N"),
             Parameter(force, 0.5, "N"),
             Parameter(rate, 5.0, "m/s^2"),
         ],
+        forces={x: force},
     )
 
 
@@ -288,24 +284,23 @@ push = F + rise * dynamicsymbols._t
 
 def pushed() -> Model:
     """A uniform rod of half length a that stands on its lower end, where F + rise t pushes it along x."""
-    return Model(
-        name="Pushed",
-        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2
-        + m * a**2 / 6 * theta.diff() ** 2
-        - m * G * y,
-        coordinates={x: "m", y: "m", theta: "rad"},
-        constraints=[
+    return point_mass(
+        "Pushed",
+        "x y",
+        [
             Contact("floor", y - a * sin(theta)),
             Nonholonomic("foot", x.diff() + a * sin(theta) * theta.diff()),
             Friction("grip", of=["foot"], normal=multiplier("floor"), static=mu),
         ],
-        forces={x: push, theta: push * a * sin(theta)},
+        angles="theta",
+        up=y,
+        energy=m * a**2 / 6 * theta.diff() ** 2,
         parameters=[
-            *MASS,
             Parameter(mu, 0.5, "1"),
             Parameter(a, 1.0, "m"),
             Parameter(rise, 0.0, "N/s"),
         ],
+        forces={x: push, theta: push * a * sin(theta)},
         inputs=[Input(F, "N")],
         start={y: 2 / 5**0.5, theta: float(np.arctan(2))},
     )
@@ -397,19 +392,18 @@ def test_oblique_impact_obeys_newton_and_coulomb(
 
 def thrown() -> Model:
     """A uniform rod of length 2 a that is thrown onto the floor with its lower end first."""
-    return Model(
-        name="Thrown",
-        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2
-        + m * a**2 * theta.diff() ** 2 / 6
-        - m * G * y,
-        coordinates={x: "m", y: "m", theta: "rad"},
-        constraints=[
+    return point_mass(
+        "Thrown",
+        "x y",
+        [
             Contact("floor", y - a * sin(theta), restitution=e),
             Nonholonomic("rub", x.diff() + a * sin(theta) * theta.diff()),
             Friction("grip", of=["rub"], normal=multiplier("floor"), static=mu),
         ],
+        angles="theta",
+        up=y,
+        energy=m * a**2 * theta.diff() ** 2 / 6,
         parameters=[
-            *MASS,
             Parameter(mu, 0.52, "1"),
             Parameter(a, 1.0, "m"),
             Parameter(e, 0.998, "1", min=0, max=1),
@@ -453,16 +447,16 @@ def test_model_exchange_tells_the_same_motion(native_fmu: Built, name: str) -> N
 
 def carried() -> Model:
     """A block on a belt whose speed an importer sets."""
-    return Model(
-        name="Carried",
-        lagrangian=m * (x.diff() ** 2 + z.diff() ** 2) / 2 - m * G * z,
-        coordinates={x: "m", z: "m"},
-        constraints=[
+    return point_mass(
+        "Carried",
+        "x z",
+        [
             Contact("belt", z),
             Nonholonomic("ride", x.diff() - F),
             Friction("grip", of=["ride"], normal=multiplier("belt"), static=mu),
         ],
-        parameters=[*MASS, Parameter(mu, 0.5, "1")],
+        up=z,
+        parameters=[Parameter(mu, 0.5, "1")],
         inputs=[Input(F, "m/s")],
     )
 
@@ -479,7 +473,7 @@ def on_moved_belt() -> Model:
             Nonholonomic("ride", x.diff() - y.diff()),
             Friction("grip", of=["ride"], normal=multiplier("floor"), static=mu),
         ],
-        parameters=[*MASS, Parameter(mu, 0.5, "1")],
+        parameters=[Parameter(m, 1.0, "kg"), Parameter(G, g, "m/s^2"), Parameter(mu, 0.5, "1")],
         inputs=[Input(F, "m")],
     )
 

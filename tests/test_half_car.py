@@ -8,10 +8,10 @@ import pytest
 from conftest import model_file
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
-from sympy import symbols
 from sympy.physics.mechanics import dynamicsymbols
+from zoo import point_mass
 
-from lagfmu import Holonomic, Input, Model, Parameter, simulate
+from lagfmu import Holonomic, Input, simulate
 
 M, J, m, g, a, b, k, c, v = 1200.0, 1500.0, 80.0, 9.81, 1.2, 1.5, 4e4, 3e3, 14.0
 
@@ -110,14 +110,12 @@ def test_a_force_that_is_driven_holds_up_no_motion(built):
     """A block that u carries at 3 m/s and F pushes sideways, in model exchange: F = 2 N alone is connected,
     u goes on by its rate, and y'' = F/m."""
     x, y, u, F = dynamicsymbols("x y u F")
-    m = symbols("m", positive=True)
-    model = Model(
-        name="Carried",
-        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2,
+    model = point_mass(
+        "Carried",
+        "x y",
+        [Holonomic("belt", x - u)],
+        mass=2.0,
         forces={y: F},
-        coordinates={x: "m", y: "m"},
-        constraints=[Holonomic("belt", x - u)],
-        parameters=[Parameter(m, 2.0, "kg")],
         inputs=[Input(u, "m", rate=3.0), Input(F, "N")],
         start={x: 0.0, x.diff(): 3.0},
     )

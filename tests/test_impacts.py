@@ -14,6 +14,7 @@ from instance import instance
 from runs import simulate_fmu
 from sympy import cos, symbols
 from sympy.physics.mechanics import dynamicsymbols
+from zoo import point_mass
 
 from lagfmu import Contact, Model, Parameter, simulate
 from lagfmu.errors import LagfmuError
@@ -134,21 +135,17 @@ def test_a_ball_rebounds_from_a_block_that_lies(run):
     """A ball falls on a block that rests on the floor: the block stays, the impulse passes through it,
     the ball rises to e^2 h."""
     low, z = dynamicsymbols("low z")
-    d, g = symbols("d g", positive=True)
-    model = Model(
-        name="Anvil",
-        lagrangian=m * (low.diff() ** 2 + z.diff() ** 2) / 2 - m * g * (low + z),
-        coordinates={low: "m", z: "m"},
-        constraints=[
+    d = symbols("d", positive=True)
+    model = point_mass(
+        "Anvil",
+        "low z",
+        [
             Contact("between", z - low - d, restitution=e),
             Contact("floor", low, restitution=e),
         ],
-        parameters=[
-            Parameter(m, 1.0, "kg"),
-            Parameter(g, G, "m/s^2"),
-            Parameter(d, 0.1, "m"),
-            restitution(0.6),
-        ],
+        up=low + z,
+        gravity=G,
+        parameters=[Parameter(d, 0.1, "m"), restitution(0.6)],
         start={low: 0.0, z: 1.1},
     )
     result = run(model, 0.8, 0.05)
@@ -162,12 +159,11 @@ def test_a_ball_bounces_from_a_table_that_rises(run):
     ground it gains speed: v+ = V + e (V - v-)."""
     z = dynamicsymbols("z")
     V = symbols("V", positive=True)
-    model = Model(
-        name="Riser",
-        lagrangian=m * z.diff() ** 2 / 2,
-        coordinates={z: "m"},
-        constraints=[Contact("table", z - V * dynamicsymbols._t, restitution=e)],
-        parameters=[Parameter(m, 1.0, "kg"), Parameter(V, 2.0, "m/s"), restitution(0.5)],
+    model = point_mass(
+        "Riser",
+        "z",
+        [Contact("table", z - V * dynamicsymbols._t, restitution=e)],
+        parameters=[Parameter(V, 2.0, "m/s"), restitution(0.5)],
         start={z: 1.0, z.diff(): -3.0},
     )
     result = run(model, 1.0, 0.1)
@@ -186,12 +182,11 @@ def test_a_restitution_outside_0_to_1_is_refused(run, value):
     the parameter has no bounds of its own."""
     free = symbols("e_free")
     x = dynamicsymbols("x")
-    model = Model(
-        name="Free",
-        lagrangian=m * x.diff() ** 2 / 2,
-        coordinates={x: "m"},
-        constraints=[Contact("floor", x, restitution=free)],
-        parameters=[Parameter(m, 1.0, "kg"), Parameter(free, 0.5, "1")],
+    model = point_mass(
+        "Free",
+        "x",
+        [Contact("floor", x, restitution=free)],
+        parameters=[Parameter(free, 0.5, "1")],
         start={x: 1.0},
     )
     with pytest.raises(LagfmuError, match=r"restitution of 'floor' is .*expected 0 .* to 1"):

@@ -11,6 +11,7 @@ from runs import simulate_fmu
 from scipy.special import ellipj, ellipk
 from sympy import symbols
 from sympy.physics.mechanics import dynamicsymbols
+from zoo import point_mass
 
 from lagfmu import Contact, Holonomic, Model, Parameter, simulate
 from lagfmu.errors import SimulationError
@@ -70,13 +71,13 @@ def test_rattle_meets_an_event_within_its_step():
     """A bob swings against a wall below its pivot, e = 1, and back, each time after a quarter of the period
     more, K(k)/w: half the step divides the error of the times by nearly 2^6, as between events."""
     x, y = dynamicsymbols("x y")
-    m, g, L = symbols("m g L", positive=True)
-    model = Model(
-        name="Knocker",
-        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2 - m * g * y,
-        coordinates={x: "m", y: "m"},
-        constraints=[Holonomic("rod", x**2 + y**2 - L**2), Contact("wall", x, restitution=1)],
-        parameters=[Parameter(m, 1, "kg"), Parameter(g, 9.81, "m/s^2"), Parameter(L, 1, "m")],
+    L = symbols("L", positive=True)
+    model = point_mass(
+        "Knocker",
+        "x y",
+        [Holonomic("rod", x**2 + y**2 - L**2), Contact("wall", x, restitution=1)],
+        up=y,
+        parameters=[Parameter(L, 1, "m")],
         start={x: math.sin(THETA0), y: -math.cos(THETA0)},
     )
     quarter = ellipk(math.sin(THETA0 / 2) ** 2) / math.sqrt(9.81)

@@ -20,6 +20,7 @@ from sympy import (
     symbols,
 )
 from sympy.physics.mechanics import dynamicsymbols
+from zoo import point_mass
 
 from lagfmu import Contact, Input, Model, Parameter, derive, simulate
 from lagfmu.errors import ModelError
@@ -50,13 +51,14 @@ def cart(name, force, lagrangian=0, **start):
 
 def lifted():
     """A block on a floor that a force of three times its weight begins to pull up at t = T/2."""
-    return Model(
-        name="Lifted",
-        lagrangian=m * y.diff() ** 2 / 2 - m * g * y,
-        coordinates={y: "m"},
+    return point_mass(
+        "Lifted",
+        "y",
+        [Contact("floor", y)],
+        up=y,
+        gravity=G,
+        parameters=[Parameter(T, 1.0, "s")],
         forces={y: 3 * m * g * Heaviside(t - T / 2)},
-        constraints=[Contact("floor", y)],
-        parameters=[Parameter(m, 1.0, "kg"), Parameter(g, G, "m/s^2"), Parameter(T, 1.0, "s")],
         start={y: 0.0},
     )
 
@@ -76,13 +78,13 @@ def chased():
 
 def hung():
     """Two blocks on a floor, the second pulled up with 2 m g as soon as the first is off the ground."""
-    return Model(
-        name="Hung",
-        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2 - m * g * (x + y),
-        coordinates={x: "m", y: "m"},
+    return point_mass(
+        "Hung",
+        "x y",
+        [Contact("first", x), Contact("second", y)],
+        up=x + y,
+        gravity=G,
         forces={x: u, y: 2 * m * g * Heaviside(x)},
-        constraints=[Contact("first", x), Contact("second", y)],
-        parameters=[Parameter(m, 1.0, "kg"), Parameter(g, G, "m/s^2")],
         inputs=[Input(u, "N")],
         start={x: 0.0, y: 0.0},
     )

@@ -7,8 +7,9 @@ from fmpy.fmi1 import FMICallException
 from instance import instance
 from sympy import cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
+from zoo import point_mass
 
-from lagfmu import Contact, Model, Nonholonomic, Parameter, build_fmu, simulate
+from lagfmu import Contact, Nonholonomic, Parameter, build_fmu, simulate
 from lagfmu.errors import SimulationError
 
 
@@ -16,24 +17,18 @@ def test_a_blade_parallel_to_its_wall_is_named(tmp_path):
     """On the wall y = 0 a blade at phi != 0 holds x too, and lambda.blade = -F / sin(phi) grows without bound
     as it turns; where it is parallel, blade and wall are one row that asks for two accelerations."""
     x, y, phi = dynamicsymbols("x y phi")
-    m, g, J, F = symbols("m g J F", positive=True)
-    model = Model(
-        name="Blade",
-        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2
-        + J * phi.diff() ** 2 / 2
-        - m * g * y
-        + F * x,
-        coordinates={x: "m", y: "m", phi: "rad"},
-        constraints=[
+    J, F = symbols("J F", positive=True)
+    model = point_mass(
+        "Blade",
+        "x y",
+        [
             Nonholonomic("blade", x.diff() * sin(phi) - y.diff() * cos(phi)),
             Contact("wall", y),
         ],
-        parameters=[
-            Parameter(m, 1.0, "kg"),
-            Parameter(g, 9.81, "m/s^2"),
-            Parameter(J, 0.05, "kg.m^2"),
-            Parameter(F, 1.0, "N"),
-        ],
+        angles="phi",
+        up=y,
+        energy=J * phi.diff() ** 2 / 2 + F * x,
+        parameters=[Parameter(J, 0.05, "kg.m^2"), Parameter(F, 1.0, "N")],
         start={phi: -0.5, phi.diff(): 0.5},
     )
     path = build_fmu(model, tmp_path, target="native", check=False)

@@ -18,6 +18,7 @@ from scipy.special import roots_laguerre
 from sympy import Matrix, Rational, cos, diff, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 from typer.testing import CliRunner
+from zoo import point_mass
 
 import lagfmu
 from lagfmu import (
@@ -38,7 +39,7 @@ from lagfmu.testing import app
 pytestmark = pytest.mark.skipif("not __import__('shutil').which('cc')", reason="no C compiler")
 
 t = dynamicsymbols._t
-m, g, a = symbols("m g a", positive=True)
+m, g = symbols("m g", positive=True)
 G = 9.81
 MASS, GRAVITY = Parameter(m, 2.0, "kg"), Parameter(g, G, "m/s^2")
 HANGING = {"x1": 0.1, "y1": -1.0, "x2": 0.1, "y2": -2.0}
@@ -366,11 +367,12 @@ def test_a_skate_rests_anywhere():
     """At rest on level ice each place and heading is an equilibrium, and it glides on: five zero poles."""
     x, y, phi = dynamicsymbols("x y phi")
     J = symbols("J", positive=True)
-    model = Model(
+    model = point_mass(
         "Skate",
-        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2 + J * phi.diff() ** 2 / 2,
-        coordinates={x: "m", y: "m", phi: "rad"},
-        constraints=[Nonholonomic("edge", x.diff() * sin(phi) - y.diff() * cos(phi))],
+        "x y",
+        [Nonholonomic("edge", x.diff() * sin(phi) - y.diff() * cos(phi))],
+        angles="phi",
+        energy=J * phi.diff() ** 2 / 2,
         parameters=[MASS, Parameter(J, 0.1, "kg.m^2")],
         start={phi: 0.4},
     )
@@ -384,16 +386,15 @@ def block(**more) -> Model:
     """A block that friction holds on an incline; x down it, z off it."""
     x, z = dynamicsymbols("x z")
     mu = symbols("mu", positive=True)
-    return Model(
+    return point_mass(
         "Block",
-        lagrangian=m * (x.diff() ** 2 + z.diff() ** 2) / 2
-        - m * g * (Rational(4, 5) * z - Rational(3, 5) * x),
-        coordinates={x: "m", z: "m"},
-        constraints=[
+        "x z",
+        [
             Contact("floor", z),
             Nonholonomic("slide", x.diff(), while_closed="floor"),
             Friction("grip", of=["slide"], normal=multiplier("floor"), static=mu, kinetic=mu),
         ],
+        up=Rational(4, 5) * z - Rational(3, 5) * x,
         parameters=[MASS, GRAVITY, Parameter(mu, more.pop("mu", 1.0), "1")],
         start=more,
     )
@@ -454,14 +455,7 @@ def test_a_wire_that_a_motor_turns_has_no_equilibrium(native_fmu):
 def test_a_contact_that_grazes_is_refused():
     """A block that lies on the floor without weight."""
     z = dynamicsymbols("z")
-    model = Model(
-        "Weightless",
-        lagrangian=m * z.diff() ** 2 / 2,
-        coordinates={z: "m"},
-        constraints=[Contact("floor", z)],
-        parameters=[MASS],
-        start={z: 0.0},
-    )
+    model = point_mass("Weightless", "z", [Contact("floor", z)], parameters=[MASS], start={z: 0.0})
     with pytest.raises(SimulationError, match="contact 'floor' grazes"):
         linearize(model)
 

@@ -19,6 +19,7 @@ from sympy.physics.mechanics import (
     TorqueActuator,
     dynamicsymbols,
 )
+from zoo import point_mass
 
 from lagfmu import (
     Contact,
@@ -259,13 +260,13 @@ def driven(second_mass: bool = False) -> Model:
     """A mass on a rail that follows u(t), against a spring and a damper."""
     u = dynamicsymbols("u")
     k = symbols("k", positive=True)
-    return Model(
-        name="Driven",
-        lagrangian=m * x.diff() ** 2 / 2 - k * x**2 / 2,
+    return point_mass(
+        "Driven",
+        "x",
+        [Holonomic("drive", x - u)],
+        energy=-k * x**2 / 2,
+        parameters=[CONSTANTS[0], FRICTION, Parameter(k, 5.0, "N/m")],
         forces={x: -c * x.diff()},
-        coordinates={x: "m"},
-        constraints=[Holonomic("drive", x - u)],
-        parameters=(CONSTANTS[0], FRICTION, Parameter(k, 5.0, "N/m")),
         inputs=[Input(u, "m", 0.0, "where the mass is")],
     )
 
@@ -467,17 +468,14 @@ def test_an_embedding_may_ride_on_a_prescribed_motion():
     """A pendulum on a pivot that is moved by U: the angle alone, with x = U + L sin(phi), moves and
     pulls on its rod as the Cartesian one does, dU/dt and its derivative included."""
     x, y, phi, U = dynamicsymbols("x y phi U")
-    m, g, L = symbols("m g L", positive=True)
-    model = Model(
-        name="Moved",
-        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2 - m * g * y,
-        coordinates={x: "m", y: "m"},
-        constraints=[Holonomic("rod", (x - U) ** 2 + y**2 - L**2)],
-        parameters=[
-            Parameter(m, 1.3, "kg"),
-            Parameter(g, 9.81, "m/s^2"),
-            Parameter(L, 0.7, "m"),
-        ],
+    L = symbols("L", positive=True)
+    model = point_mass(
+        "Moved",
+        "x y",
+        [Holonomic("rod", (x - U) ** 2 + y**2 - L**2)],
+        up=y,
+        mass=1.3,
+        parameters=[Parameter(L, 0.7, "m")],
         inputs=[Input(U, "m", 0.1)],
         start={x: 0.1 + 0.7 * math.sin(0.4), y: -0.7 * math.cos(0.4)},
         embedding=Embedding(

@@ -9,6 +9,7 @@ from fmpy.fmi1 import FMICallException
 from instance import instance
 from sympy import cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
+from zoo import point_mass
 
 from lagfmu import Contact, Friction, Input, Model, Nonholonomic, Parameter, multiplier
 from lagfmu.bodies import Body, Gravity, Ground, Motor, Prismatic, Revolute, mechanism
@@ -125,26 +126,26 @@ def box() -> Model:
     """1 kg on two feet, which together hold mu m g = 3.924 N; pushed at its centre."""
     x, z, theta, F = dynamicsymbols("x z theta F")
     m, G, mu, h, a, J = symbols("m g mu h a J", positive=True)
-    return Model(
-        name="Box",
-        lagrangian=m * (x.diff() ** 2 + z.diff() ** 2) / 2 + J * theta.diff() ** 2 / 2 - m * G * z,
-        coordinates={x: "m", z: "m", theta: "rad"},
-        forces={x: F},
-        inputs=[Input(F, "N", 2.0)],
-        constraints=[
+    return point_mass(
+        "Box",
+        "x z",
+        [
             Contact("left", z - h * cos(theta) - a * sin(theta)),
             Contact("right", z - h * cos(theta) + a * sin(theta)),
             Nonholonomic("rub", x.diff() + h * cos(theta) * theta.diff()),
             Friction("grip", ["rub"], multiplier("left") + multiplier("right"), static=mu),
         ],
+        angles="theta",
+        energy=J * theta.diff() ** 2 / 2 - m * G * z,
         parameters=[
-            Parameter(m, 1.0, "kg"),
             Parameter(G, g, "m/s^2"),
             Parameter(mu, 0.4, "1"),
             Parameter(h, 0.4, "m"),
             Parameter(a, 0.3, "m"),
             Parameter(J, 0.05, "kg.m^2"),
         ],
+        forces={x: F},
+        inputs=[Input(F, "N", 2.0)],
         start={z: 0.4},
     )
 
@@ -199,14 +200,14 @@ def test_headway_is_judged_by_the_motion_as_it_is(built):
     """A mass that creeps at 1e-7 m/s has a natural time of 1e7 s; a spring k x^3 / L^2 on which it is then
     pushed makes that 30 ms, and a second of it is no lack of headway: the energy of the push is kept."""
     x, F = dynamicsymbols("x F")
-    m, k, L = symbols("m k L", positive=True)
-    model = Model(
-        name="Creeps",
-        lagrangian=m * x.diff() ** 2 / 2 - k * x**4 / L**2 / 4,
-        coordinates={x: "m"},
+    k, L = symbols("k L", positive=True)
+    model = point_mass(
+        "Creeps",
+        "x",
+        energy=-k * x**4 / L**2 / 4,
+        parameters=[Parameter(k, 1e3, "N/m"), Parameter(L, 1.0, "m")],
         forces={x: F},
         inputs=[Input(F, "N")],
-        parameters=[Parameter(m, 1.0, "kg"), Parameter(k, 1e3, "N/m"), Parameter(L, 1.0, "m")],
         start={x.diff(): 1e-7},
     )
     with instance(built(model)) as one:

@@ -10,6 +10,7 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 from sympy import cos, symbols
 from sympy.physics.mechanics import dynamicsymbols
+from zoo import point_mass
 
 from lagfmu import Contact, Model, Parameter
 
@@ -40,11 +41,11 @@ def spheres():
 def table():
     """A block on a table that goes up and down as A (1 - cos w t)."""
     A, w, t = *symbols("A w", positive=True), dynamicsymbols._t
-    return Model(
-        name="Table",
-        lagrangian=m * y.diff() ** 2 / 2 - m * g * y,
-        coordinates={y: "m"},
-        constraints=[Contact("table", y - A * (1 - cos(w * t)))],
+    return point_mass(
+        "Table",
+        "y",
+        [Contact("table", y - A * (1 - cos(w * t)))],
+        up=y,
         parameters=[*CONSTANTS, Parameter(A, AMPLITUDE, "m"), Parameter(w, SHAKEN, "rad/s")],
         start={y: 0.0},
     )

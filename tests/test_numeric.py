@@ -9,6 +9,7 @@ import pytest
 from scipy.sparse import csr_array
 from sympy import cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
+from zoo import point_mass
 
 from lagfmu import Contact, Friction, Model, Nonholonomic, Parameter, multiplier
 from lagfmu.testing import StepFailureError, prepare, solve_at_start
@@ -16,11 +17,12 @@ from lagfmu.testing import StepFailureError, prepare, solve_at_start
 g = 9.81  # m/s^2
 x, y, theta = dynamicsymbols("x y theta")
 m, k, L, G, mu, alpha = symbols("m k L g mu alpha", positive=True)
-SPRING = Model(
+SPRING = point_mass(
     "Spring",
-    lagrangian=m * x.diff() ** 2 / 2 - k * x**2 / 2 + m * G * x,
-    coordinates={x: "m"},
-    parameters=[Parameter(m, 2.0, "kg"), Parameter(k, 50.0, "N/m"), Parameter(G, g, "m/s^2")],
+    "x",
+    energy=-k * x**2 / 2 + m * G * x,
+    mass=2.0,
+    parameters=[Parameter(k, 50.0, "N/m"), Parameter(G, g, "m/s^2")],
     start={x: 2.0 * g / 50.0},
 )
 PENDULUM = Model(
@@ -30,17 +32,17 @@ PENDULUM = Model(
     parameters=[Parameter(m, 2.0, "kg"), Parameter(L, 0.7, "m"), Parameter(G, g, "m/s^2")],
     start={theta: 0.3},
 )
-BLOCK = Model(
+BLOCK = point_mass(
     "Block",
-    lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2 + m * G * (x * sin(alpha) - y * cos(alpha)),
-    coordinates={x: "m", y: "m"},
-    constraints=[
+    "x y",
+    [
         Contact("floor", y - L),
         Nonholonomic("foot", x.diff()),
         Friction("grip", of=["foot"], normal=multiplier("floor"), static=mu),
     ],
+    energy=m * G * (x * sin(alpha) - y * cos(alpha)),
+    mass=2.0,
     parameters=[
-        Parameter(m, 2.0, "kg"),
         Parameter(G, g, "m/s^2"),
         Parameter(mu, 0.4, "1"),
         Parameter(alpha, 0.6, "rad"),

@@ -14,6 +14,7 @@ from instance import Instance, instance
 from runs import simulate_fmu
 from sympy import symbols
 from sympy.physics.mechanics import dynamicsymbols
+from zoo import point_mass
 
 from lagfmu import Input, Model, Output, Parameter, Peak
 from lagfmu.errors import BuildError, ModelError
@@ -150,15 +151,15 @@ def test_a_slide_in_two_directions_ends_without_a_peak_of_its_direction(built: A
 def test_both_sides_of_an_inputs_jump_count(built: Any) -> None:
     """A force that pushes for one communication step: its acceleration has been there when the step began,
     though no point shows it; the one before it was none."""
-    m, k = symbols("m k", positive=True)
+    k = symbols("k", positive=True)
     x, F = dynamicsymbols("x F")
-    model = Model(
-        name="Pushed",
-        lagrangian=m * x.diff() ** 2 / 2 - k * x**2 / 2,
-        coordinates={x: "m"},
+    model = point_mass(
+        "Pushed",
+        "x",
+        energy=-k * x**2 / 2,
+        parameters=[Parameter(k, 1e4, "N/m")],
         forces={x: F},
         inputs=[Input(F, "N")],
-        parameters=[Parameter(m, 1.0, "kg"), Parameter(k, 1e4, "N/m")],
         outputs=[Peak("der(x,2)"), Peak("x")],
     )
     with instance(built(model)) as one:
@@ -263,11 +264,11 @@ x = dynamicsymbols("x")
 
 
 def oscillator(outputs: Sequence[Output | Peak]) -> Model:
-    return Model(
-        name="Oscillator",
-        lagrangian=m * x.diff() ** 2 / 2 - m * x**2 / (2 * L),
-        coordinates={x: "m"},
-        parameters=[Parameter(m, 1.0, "kg"), Parameter(L, 1.0, "s^2")],
+    return point_mass(
+        "Oscillator",
+        "x",
+        energy=-m * x**2 / (2 * L),
+        parameters=[Parameter(L, 1.0, "s^2")],
         outputs=outputs,
         start={x: 1.0},
     )

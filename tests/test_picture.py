@@ -12,6 +12,7 @@ import pytest
 import sympy as sp
 from conftest import Opened, model_file
 from sympy.physics.mechanics import dynamicsymbols
+from zoo import point_mass
 
 from lagfmu import (
     Arrow,
@@ -259,13 +260,12 @@ def test_without_webgl_a_picture_in_space_is_projected(tmp_path: Path, opened: O
 def test_a_slack_string_hangs(tmp_path: Path, opened: Opened) -> None:
     """A bob on a string of 1 m, thrown up from 0.5 m below its peg: until it falls into the string that hangs
     below the straight line and is as long as ever, and at the end it is straight; in a film, too."""
-    m, g = sp.symbols("m g", positive=True)
-    model = Model(
-        name="Thrown",
-        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2 - m * g * y,
-        coordinates={x: "m", y: "m"},
-        constraints=[Contact("string", L**2 - x**2 - y**2)],
-        parameters=[Parameter(m, 1, "kg"), Parameter(g, 9.81, "m/s^2"), Parameter(L, 1, "m")],
+    model = point_mass(
+        "Thrown",
+        "x y",
+        [Contact("string", L**2 - x**2 - y**2)],
+        up=y,
+        parameters=[Parameter(L, 1, "m")],
         start={x: 0.3, y: -0.5, y.diff(): 1.0},
         picture=[Line((0, 0), (x, y), length=L), Disk((x, y))],
     )

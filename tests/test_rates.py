@@ -12,6 +12,7 @@ from conftest import model_file
 from instance import instance
 from sympy import symbols
 from sympy.physics.mechanics import dynamicsymbols
+from zoo import point_mass
 
 from lagfmu import Contact, Holonomic, Input, Model, Nonholonomic, Parameter, Scene, simulate, sweep
 from lagfmu.errors import LagfmuWarning, ModelError, SettingError
@@ -150,15 +151,8 @@ def test_a_floor_that_was_pulled_away_is_left_as_soon_as_that_is_read(built, tar
     """A block on a floor that drops by 1 m at once: nothing pushes it any more, before the next step too;
     the step tells of one departure, whether somebody has looked or not."""
     z, u = dynamicsymbols("z u")
-    m, g = symbols("m g", positive=True)
-    model = Model(
-        name="Block",
-        lagrangian=m * z.diff() ** 2 / 2 - m * g * z,
-        coordinates={z: "m"},
-        constraints=[Contact("floor", z - u)],
-        parameters=[Parameter(m, 1.0, "kg"), Parameter(g, 9.81, "m/s^2")],
-        inputs=[Input(u, "m")],
-        start={z: 0.0},
+    model = point_mass(
+        "Block", "z", [Contact("floor", z - u)], up=z, inputs=[Input(u, "m")], start={z: 0.0}
     )
     fmu = built(model, target=target)
     ends = []
@@ -358,16 +352,10 @@ def test_rates_are_given_or_estimated():
 def test_a_constraint_on_velocities_may_be_driven(target, of):
     """A block is carried at x' = w with w = t/2, or at x' = u' with u = t^2/4: x = t^2/4, and the force that
     carries it is lambda = m/2; either way the derivatives are inputs of the FMU."""
-    m = symbols("m", positive=True)
     x, u = dynamicsymbols("x u")
     row, unit = (x.diff() - u, "m/s") if of == "velocity" else (x.diff() - u.diff(), "m")
-    model = Model(
-        name="Carried",
-        lagrangian=m * x.diff() ** 2 / 2,
-        coordinates={x: "m"},
-        constraints=[Nonholonomic("belt", row)],
-        parameters=[Parameter(m, 3.0, "kg")],
-        inputs=[Input(u, unit, 0.0)],
+    model = point_mass(
+        "Carried", "x", [Nonholonomic("belt", row)], mass=3.0, inputs=[Input(u, unit, 0.0)]
     )
     table = np.zeros(11, dtype=[(n, float) for n in ("time", "u", "der(u)", "der(u,2)")])
     table["time"] = time = np.linspace(0, 1, 11)

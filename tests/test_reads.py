@@ -12,6 +12,7 @@ import pytest
 from instance import Instance, instance
 from sympy import cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
+from zoo import point_mass
 
 from lagfmu import Contact, Holonomic, Input, Model, Parameter, Scene
 from lagfmu.testing import find_compiler, load
@@ -50,14 +51,13 @@ def box() -> Model:
 def tied() -> Model:
     """A block of 1 kg on a floor that rises by 1/4 of y, with x = 2 y tied."""
     x, y, z, P = dynamicsymbols("x y z P")
-    m, g = symbols("m g", positive=True)
-    return Model(
-        name="Tied",
-        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2 + z.diff() ** 2) / 2 - m * g * z,
-        coordinates={x: "m", y: "m", z: "m"},
+    return point_mass(
+        "Tied",
+        "x y z",
+        [Holonomic("tie", x - 2 * y), Contact("floor", z - y / 4)],
+        up=z,
+        gravity=G,
         forces={z: P},
-        constraints=[Holonomic("tie", x - 2 * y), Contact("floor", z - y / 4)],
-        parameters=[Parameter(m, 1.0, "kg"), Parameter(g, G, "m/s^2")],
         inputs=[Input(P, "N")],
         start={z: 0.0},
     )

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from sympy import cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
+from zoo import point_mass
 
 from lagfmu import Embedding, Holonomic, Model, Parameter, Scene, simulate
 from lagfmu.errors import CannotStartError
@@ -20,16 +21,13 @@ LENGTH = 2.0
 
 def pendulum(start) -> Model:
     """A bob at x = L sin theta, y = L cos theta (down); minimal steps theta."""
-    return Model(
-        name="Bob",
-        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2 + m * g * y,
-        coordinates={x: "m", y: "m", theta: "rad"},
-        constraints=[Holonomic("cx", x - L * sin(theta)), Holonomic("cy", y - L * cos(theta))],
-        parameters=[
-            Parameter(m, 1.0, "kg"),
-            Parameter(g, 9.81, "m/s^2"),
-            Parameter(L, LENGTH, "m"),
-        ],
+    return point_mass(
+        "Bob",
+        "x y",
+        [Holonomic("cx", x - L * sin(theta)), Holonomic("cy", y - L * cos(theta))],
+        angles="theta",
+        energy=m * g * y,
+        parameters=[Parameter(g, 9.81, "m/s^2"), Parameter(L, LENGTH, "m")],
         start=start,
     )
 
@@ -74,16 +72,12 @@ def test_a_start_off_the_constraints_is_refused():
 
 def test_an_embedding_has_a_start_of_its_own():
     """x = 0.5 m and theta = 1 rad do not agree: which is taken is said, with both values."""
-    model = Model(
-        name="Embedded",
-        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2 + m * g * y,
-        coordinates={x: "m", y: "m"},
-        constraints=[Holonomic("rod", x**2 + y**2 - L**2)],
-        parameters=[
-            Parameter(m, 1.0, "kg"),
-            Parameter(g, 9.81, "m/s^2"),
-            Parameter(L, LENGTH, "m"),
-        ],
+    model = point_mass(
+        "Embedded",
+        "x y",
+        [Holonomic("rod", x**2 + y**2 - L**2)],
+        energy=m * g * y,
+        parameters=[Parameter(g, 9.81, "m/s^2"), Parameter(L, LENGTH, "m")],
         start={x: 0.5, y: math.sqrt(3.75)},
         embedding=Embedding({theta: "rad"}, {x: L * sin(theta), y: L * cos(theta)}, {theta: 1.0}),
     )

@@ -20,6 +20,7 @@ from runs import simulate_fmu
 from sympy import sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
 from tops import door
+from zoo import point_mass
 
 from lagfmu import Contact, Holonomic, Model, Output, Parameter, Scene, multiplier, simulate
 from lagfmu.errors import ModelError, SimulationError
@@ -274,21 +275,15 @@ def test_rows_that_come_to_contradict_each_other_are_named():
     that x rests, and the other that it does not.  That is no singular place."""
     x, y = dynamicsymbols("x y")
     m, L, a, T = symbols("m L a T", positive=True)
-    model = Model(
-        name="Contradicted",
-        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2,
-        forces={y: m * a},
-        coordinates={x: "m", y: "m"},
-        constraints=[
+    model = point_mass(
+        "Contradicted",
+        "x y",
+        [
             Holonomic("still", x - L),
             Holonomic("led", x - L - a * dynamicsymbols._t**6 / T**4),
         ],
-        parameters=[
-            Parameter(m, 1.0, "kg"),
-            Parameter(L, 1.0, "m"),
-            Parameter(a, 1.0, "m/s^2"),
-            Parameter(T, 1.0, "s"),
-        ],
+        parameters=[Parameter(L, 1.0, "m"), Parameter(a, 1.0, "m/s^2"), Parameter(T, 1.0, "s")],
+        forces={y: m * a},
         start={x: L},
     )
     with pytest.raises(
@@ -304,18 +299,14 @@ def test_a_force_is_not_unique_as_long_as_what_is_redundant_is_closed(target):
     y = dynamicsymbols("y")
     m, g, T, h = symbols("m g T h", positive=True)
     left, right = multiplier("left"), multiplier("right")
-    block = Model(
-        name="Props",
-        lagrangian=m * y.diff() ** 2 / 2 - m * g * y,
+    block = point_mass(
+        "Props",
+        "y",
+        [Contact("left", y), Contact("right", y)],
+        up=y,
+        mass=2.0,
+        parameters=[Parameter(T, 1.0, "s"), Parameter(h, 0.2, "m")],
         forces={y: m * g * dynamicsymbols._t / T},
-        coordinates={y: "m"},
-        constraints=[Contact("left", y), Contact("right", y)],
-        parameters=[
-            Parameter(m, 2.0, "kg"),
-            Parameter(g, 9.81, "m/s^2"),
-            Parameter(T, 1.0, "s"),
-            Parameter(h, 0.2, "m"),
-        ],
         start={y: h},
         outputs=[
             Output("one", left, "N", unique=True),

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from sympy import exp, log, sin, sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
+from zoo import point_mass
 
 from lagfmu import (
     Contact,
@@ -34,11 +35,11 @@ PARAMETERS = [Parameter(m, 2.0, "kg"), Parameter(g, 9.81, "m/s^2"), Parameter(L,
 
 def swing(rods: int) -> Model:
     """A bob on a rod that is said as often."""
-    return Model(
-        name="Swing",
-        lagrangian=m * (x.diff() ** 2 + z.diff() ** 2) / 2 - m * g * z,
-        coordinates={x: "m", z: "m"},
-        constraints=[Holonomic(f"rod{k}", x**2 + z**2 - L**2) for k in range(rods)],
+    return point_mass(
+        "Swing",
+        "x z",
+        [Holonomic(f"rod{k}", x**2 + z**2 - L**2) for k in range(rods)],
+        up=z,
         parameters=PARAMETERS,
         start={x: 0.6, z: -0.8},
     )
@@ -163,23 +164,17 @@ def test_a_foot_that_lands_with_the_other_may_be_thrown_off_by_it(wide_plank):
 
 def test_a_fall_from_nothing_has_a_size():
     """From rest at 0, without a length in the model, the way itself is the size of z: z = -g t^2 / 2."""
-    model = Model(
-        name="Fall",
-        lagrangian=m * z.diff() ** 2 / 2 - m * g * z,
-        coordinates={z: "m"},
-        parameters=PARAMETERS[:2],
-    )
+    model = point_mass("Fall", "z", up=z, parameters=PARAMETERS[:2])
     run = simulate(model, 1.0, 0.1, target="python")
     np.testing.assert_allclose(run["z"], -9.81 * run["time"] ** 2 / 2, rtol=1e-12, atol=1e-15)
 
 
 def test_what_hardly_moves_is_stepped():
     """A bead that drifts along its wire at 1e-154 m/s goes on so, though squares of its errors underflow."""
-    model = Model(
-        name="Adrift",
-        lagrangian=m * (x.diff() ** 2 + z.diff() ** 2) / 2,
-        coordinates={x: "m", z: "m"},
-        constraints=[Holonomic("wire", z - L)],
+    model = point_mass(
+        "Adrift",
+        "x z",
+        [Holonomic("wire", z - L)],
         parameters=PARAMETERS,
         start={x: 1.0, z: 1.0, x.diff(): 1e-154},
     )
@@ -191,13 +186,13 @@ def test_a_dip_of_lambda_within_a_step_is_found():
     though lambda is m g again at the end of the communication step."""
     pull = Parameter(F, 40.0, "N"), Parameter(w, 0.01, "s")
     T = symbols("T", positive=True)
-    model = Model(
-        name="Lifted",
-        lagrangian=m * z.diff() ** 2 / 2 - m * g * z,
-        forces={z: F * exp(-(((t - T) / w) ** 2))},
-        coordinates={z: "m"},
-        constraints=[Contact("floor", z)],
+    model = point_mass(
+        "Lifted",
+        "z",
+        [Contact("floor", z)],
+        up=z,
         parameters=[*PARAMETERS[:2], *pull, Parameter(T, 0.055, "s")],
+        forces={z: F * exp(-(((t - T) / w) ** 2))},
     )
     run = simulate(model, 0.1, 0.1, target="python")
     assert run["departure.floor.count"][-1] == 1
@@ -208,15 +203,15 @@ def test_a_dip_of_lambda_within_a_step_is_found():
 def test_all_that_native_fmus_alone_do_is_refused_at_once(tmp_path):
     """Friction, error bars, a peak, a method: one message, with the remedy."""
     mu = symbols("mu", positive=True)
-    model = Model(
-        name="Block",
-        lagrangian=m * (x.diff() ** 2 + z.diff() ** 2) / 2 - m * g * z,
-        coordinates={x: "m", z: "m"},
-        constraints=[
+    model = point_mass(
+        "Block",
+        "x z",
+        [
             Contact("floor", z),
             Nonholonomic("hold", x.diff()),
             Friction("grip", of=["hold"], normal=multiplier("floor"), static=mu),
         ],
+        up=z,
         parameters=[*PARAMETERS[:2], Parameter(mu, 0.5, "1")],
         outputs=[Peak("x")],
     )

@@ -19,6 +19,7 @@ from linkages import FOUR_BAR, TIME, rods
 from runtime import RUNTIME_FILES, compile_library
 from sympy import Rational, cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
+from zoo import point_mass
 
 from lagfmu import (
     Contact,
@@ -44,9 +45,9 @@ SOURCES = sorted(  # but what stands on the solver
 )
 BENCH = Path(__file__).with_name("solver_bench.c")
 
-x, y, s, theta = dynamicsymbols("x y s theta")
+x, y, s = dynamicsymbols("x y s")
 push, lift = dynamicsymbols("push lift")
-m, g, J, e, arm = symbols("m g J e arm", positive=True)
+m, g, J, arm = symbols("m g J arm", positive=True)
 MASS = Parameter(m, 2.0, "kg")
 
 
@@ -195,11 +196,10 @@ def test_where_curves_touch_a_projection_ends_at_rounding(bench):
     beside a length of 1 m, rounding; 1e-3 m from there it is not, and what is told is that the place is
     singular, not that steps are too long."""
     k, length = symbols("k length", positive=True)
-    model = Model(
-        name="Tangent",
-        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2,
-        coordinates={x: "m", y: "m"},
-        constraints=[Holonomic("line", y), Holonomic("curve", y - k * x**2)],
+    model = point_mass(
+        "Tangent",
+        "x y",
+        [Holonomic("line", y), Holonomic("curve", y - k * x**2)],
         parameters=[MASS, Parameter(k, 1.0, "1/m"), Parameter(length, 1.0, "m")],
         start={x: 0.0, y: 0.0},
     )
@@ -215,11 +215,10 @@ def test_where_curves_touch_a_projection_ends_at_rounding(bench):
 def test_velocities_that_contradict_each_other_are_refused(bench):
     """x' = 1 and x' = 0.5 cannot both hold."""
     fast, slow = symbols("a b", real=True)
-    model = Model(
-        name="Twice",
-        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2,
-        coordinates={x: "m", y: "m"},
-        constraints=[Nonholonomic("one", x.diff() - fast), Nonholonomic("two", x.diff() - slow)],
+    model = point_mass(
+        "Twice",
+        "x y",
+        [Nonholonomic("one", x.diff() - fast), Nonholonomic("two", x.diff() - slow)],
         parameters=[MASS, Parameter(fast, 1.0, "m/s"), Parameter(slow, 1.0, "m/s")],
     )
     with pytest.warns(UserWarning, match="follows from the others"):
@@ -327,19 +326,18 @@ def test_rows_that_others_hold_at_rest_need_no_orthogonal_factors(bench):
         for side in (-1, 1)
     ]
     one = bench(
-        Model(
-            name="LevelBar",
-            coordinates={x: "m", height: "m", turn: "rad"},
-            lagrangian=m * (x.diff() ** 2 + height.diff() ** 2) / 2
-            + J * turn.diff() ** 2 / 2
-            - m * g * height,
-            constraints=[
+        point_mass(
+            "LevelBar",
+            "x height",
+            [
                 *(Holonomic(f"string{k}", f) for k, f in enumerate(strings)),
                 Holonomic("level", turn),
             ],
+            angles="turn",
+            up=height,
+            energy=J * turn.diff() ** 2 / 2,
             parameters=[
                 MASS,
-                Parameter(g, 9.81, "m/s^2"),
                 Parameter(J, 0.1, "kg.m^2"),
                 Parameter(arm, 1.1, "m"),
                 Parameter(d, 0.4, "m"),
@@ -419,15 +417,12 @@ def walls(count: int) -> tuple[Model, Any]:
     walls' inward normals."""
     angles = np.linspace(0.2, 2.9, count)
     normals = np.column_stack([np.cos(angles), np.sin(angles)])
-    model = Model(
-        name=f"Wedge{count}",
-        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2,
-        forces={x: push, y: lift},
-        coordinates={x: "m", y: "m"},
-        constraints=[
-            Contact(f"wall{k}", float(a) * x + float(b) * y) for k, (a, b) in enumerate(normals)
-        ],
+    model = point_mass(
+        f"Wedge{count}",
+        "x y",
+        [Contact(f"wall{k}", float(a) * x + float(b) * y) for k, (a, b) in enumerate(normals)],
         parameters=[MASS],
+        forces={x: push, y: lift},
         inputs=[Input(push, "N"), Input(lift, "N", 1.0)],
         start={x: 0.0, y: 1.0},
     )
@@ -495,16 +490,15 @@ def test_modes_are_found_where_the_active_set_goes_in_a_circle(bench):
     and closing the worst contact comes back to where it was; trying all finds the wall."""
     normals = np.array([(3, -1), (2, 0), (-1, -2), (0, -1), (-1, 0)])
     across, along = symbols("a0:5", real=True), symbols("b0:5", real=True)
-    model = Model(
-        name="Jammed",
-        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2,
-        forces={x: push, y: lift},
-        coordinates={x: "m", y: "m"},
-        constraints=[
+    model = point_mass(
+        "Jammed",
+        "x y",
+        [
             Contact(f"wall{k}", a * x + b * y)
             for k, (a, b) in enumerate(zip(across, along, strict=True))
         ],
-        parameters=[Parameter(m, 1.0, "kg"), *(Parameter(k, 1.0, "1") for k in (*across, *along))],
+        parameters=[*(Parameter(k, 1.0, "1") for k in (*across, *along))],
+        forces={x: push, y: lift},
         inputs=[Input(push, "N"), Input(lift, "N")],
         start={x: 1.0, y: 1.0},
     )
@@ -518,13 +512,12 @@ def test_modes_are_found_where_the_active_set_goes_in_a_circle(bench):
 def test_what_a_wall_does_depends_on_no_unit_and_no_side(unit, bench):
     """f = c x in whatever unit of length, of a floor (c > 0) or a ceiling (c < 0): 1 N towards it is met by
     lambda = 1/|c|, with 1 N away from it the body leaves."""
-    model = Model(
-        name="Wall",
-        lagrangian=m * x.diff() ** 2 / 2,
-        forces={x: push},
-        coordinates={x: "m"},
-        constraints=[Contact("wall", arm * x)],
+    model = point_mass(
+        "Wall",
+        "x",
+        [Contact("wall", arm * x)],
         parameters=[MASS, Parameter(arm, 1.0, "1")],
+        forces={x: push},
         inputs=[Input(push, "N")],
         start={x: 1.0},
     )
@@ -707,11 +700,10 @@ def test_rounding_of_a_fast_motion_does_not_jam_an_impact(bench):
     with 1e-6 m/s: it rebounds with e = 1/2 and runs on."""
     a = 0.3
     across = -sin(a) * x + float(np.cos(a)) * y
-    model = Model(
-        name="Alley",
-        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2 + s.diff() ** 2) / 2,
-        coordinates={x: "m", y: "m", s: "m"},
-        constraints=[
+    model = point_mass(
+        "Alley",
+        "x y s",
+        [
             Contact("left", across),
             Contact("right", -1.1 * across),
             Contact("end", s, restitution=Rational(1, 2)),

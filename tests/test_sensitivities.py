@@ -19,6 +19,7 @@ from scipy.special import ellipj, ellipk
 from sympy import symbols
 from sympy.physics.mechanics import dynamicsymbols
 from typer.testing import CliRunner
+from zoo import point_mass
 
 from lagfmu import Contact, Holonomic, Model, Parameter, Scene, fit
 from lagfmu.errors import BuildError, RequestError
@@ -121,18 +122,13 @@ def test_a_stiff_damper_by_the_implicit_method(built):
     x = x0 (r2 e^(r1 t) - r1 e^(r2 t))/(r2 - r1), slow by r1 = -0.01/s and quick by r2 = -1e6/s. radau5 has
     the derivatives in steps of the slow motion, and the run keeps the bits that it has without them."""
     x = dynamicsymbols("x")
-    m, c, k, x0 = symbols("m c k x0", positive=True)
-    model = Model(
-        name="Damper",
-        lagrangian=m * x.diff() ** 2 / 2 - k * x**2 / 2,
+    c, k, x0 = symbols("c k x0", positive=True)
+    model = point_mass(
+        "Damper",
+        "x",
+        energy=-k * x**2 / 2,
+        parameters=[Parameter(c, 1e6, "N.s/m"), Parameter(k, 1e4, "N/m"), Parameter(x0, 0.5, "m")],
         forces={x: -c * x.diff()},
-        coordinates={x: "m"},
-        parameters=[
-            Parameter(m, 1.0, "kg"),
-            Parameter(c, 1e6, "N.s/m"),
-            Parameter(k, 1e4, "N/m"),
-            Parameter(x0, 0.5, "m"),
-        ],
         start={x: x0},
     )
     plain = built(model, Scene("Damper", method="radau5", methods=("radau5",)))
@@ -271,18 +267,14 @@ def test_a_ball_that_has_all_but_come_to_rest(built):
     ... + e^(n-1))), dT/db = -T/(2 h), with the impulse (1 + e) e^(n-1) m sqrt(2 g h).  At the 29th it falls
     with 1e-4 m/s, of which differences at heights of 1 m know four digits."""
     z = dynamicsymbols("z")
-    m, g, b, e = symbols("m g b e", positive=True)
-    model = Model(
-        name="Tired",
-        lagrangian=m * z.diff() ** 2 / 2 - m * g * z,
-        coordinates={z: "m"},
-        constraints=[Contact("floor", z - b, restitution=e)],
-        parameters=[
-            Parameter(m, 1.0, "kg"),
-            Parameter(g, 2.0, "m/s^2"),
-            Parameter(b, 1.0, "m"),
-            Parameter(e, 0.7, "1"),
-        ],
+    b, e = symbols("b e", positive=True)
+    model = point_mass(
+        "Tired",
+        "z",
+        [Contact("floor", z - b, restitution=e)],
+        up=z,
+        gravity=2.0,
+        parameters=[Parameter(b, 1.0, "m"), Parameter(e, 0.7, "1")],
         start={z: 2.0},
     )
     fmu = built(model, Scene("Tired", sensitivities=("closing.floor.*:e,b,z",)))
@@ -409,21 +401,17 @@ def test_a_start_that_another_radius_would_open(varied):
 def thrown(slope: float) -> Model:
     """A ball that falls beside a wall at x = 1 onto a floor, both of which may be reached at one instant."""
     x, z = dynamicsymbols("x z")
-    m, g, v, b = symbols("m g v b", positive=True)
-    return Model(
-        name="Corner",
-        lagrangian=m * (x.diff() ** 2 + z.diff() ** 2) / 2 - m * g * z,
-        coordinates={x: "m", z: "m"},
-        constraints=[
+    v, b = symbols("v b", positive=True)
+    return point_mass(
+        "Corner",
+        "x z",
+        [
             Contact("floor", z + slope * x, "on the floor", restitution=0.5),
             Contact("wall", b - x, "at the wall", restitution=0.5),
         ],
-        parameters=[
-            Parameter(m, 1.0, "kg"),
-            Parameter(g, 2.0, "m/s^2"),
-            Parameter(v, 1.0, "m/s"),
-            Parameter(b, 1.0, "m"),
-        ],
+        up=z,
+        gravity=2.0,
+        parameters=[Parameter(v, 1.0, "m/s"), Parameter(b, 1.0, "m")],
         start={x: 0.0, z: b - slope * b, x.diff(): v},
     )
 
@@ -488,19 +476,18 @@ def test_two_contacts_that_are_met_one_right_after_the_other(built, later):
 def above_and_below(order: int, part: float) -> Model:
     """A ball falls on a floor at T, another comes up against a ceiling at T0 + part (T - T0), and T is T0."""
     y, z = dynamicsymbols("y z")
-    m, g, w, c, T, T0 = symbols("m g w c T T0", positive=True)
+    g, w, c, T, T0 = symbols("g w c T T0", positive=True)
     then = part * T + (1 - part) * T0
-    return Model(
-        name="AboveAndBelow",
-        lagrangian=m * (y.diff() ** 2 + z.diff() ** 2) / 2 - m * g * (y + z),
-        coordinates={y: "m", z: "m"},
-        constraints=[
+    return point_mass(
+        "AboveAndBelow",
+        "y z",
+        [
             Contact("floor", y, restitution=0.5),
             Contact("ceiling", c - z, restitution=0.5),
         ][::order],
+        up=y + z,
+        gravity=2.0,
         parameters=[
-            Parameter(m, 1.0, "kg"),
-            Parameter(g, 2.0, "m/s^2"),
             Parameter(w, 2e-4, "m/s"),
             Parameter(c, 1.0, "m"),
             Parameter(T, 1.0, "s"),
@@ -539,18 +526,14 @@ def test_a_contact_that_is_only_touched(built):
     at all. To one of 1e-13 it does, dt_e/db = 2/s, ds/db = -4/s, and z = b - e s tau - tau^2 at tau
     after it goes with them."""
     z = dynamicsymbols("z")
-    m, g, b, h = symbols("m g b h", positive=True)
-    model = Model(
-        name="Touch",
-        lagrangian=m * z.diff() ** 2 / 2 - m * g * z,
-        coordinates={z: "m"},
-        constraints=[Contact("ceiling", b - z, "below the ceiling", restitution=0.5)],
-        parameters=[
-            Parameter(m, 1.0, "kg"),
-            Parameter(g, 2.0, "m/s^2"),
-            Parameter(b, 1.0, "m"),
-            Parameter(h, 1e-8, "m"),
-        ],
+    b, h = symbols("b h", positive=True)
+    model = point_mass(
+        "Touch",
+        "z",
+        [Contact("ceiling", b - z, "below the ceiling", restitution=0.5)],
+        up=z,
+        gravity=2.0,
+        parameters=[Parameter(b, 1.0, "m"), Parameter(h, 1e-8, "m")],
         start={z: h - b, z.diff(): math.sqrt(8)},
     )
     fmu = built(model, Scene("Touch", stop_time=2.0, sensitivities=("z:b",)))

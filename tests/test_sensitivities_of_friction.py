@@ -6,12 +6,12 @@ import numpy as np
 from runs import evenly
 from sympy import cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
+from zoo import point_mass
 
 from lagfmu import (
     Contact,
     Friction,
     Holonomic,
-    Model,
     Nonholonomic,
     Parameter,
     Scene,
@@ -26,11 +26,10 @@ m, L, r, mu, omega0, G, alpha, u, w = symbols("m L r mu omega0 G alpha u w", pos
 def test_a_rod_spins_down_in_a_rubbing_pin(built):
     """A point mass on a rod, no gravity: its pin bears N = m L sqrt(omega^4 + omega'^2) and brakes by mu r N,
     so that omega' = -k omega^2 with k = s/sqrt(1 - s^2), s = mu r/L, and omega = omega0/(1 + k omega0 t)."""
-    rod = Model(
-        name="Spin",
-        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2,
-        coordinates={x: "m", y: "m", theta: "rad"},
-        constraints=[
+    rod = point_mass(
+        "Spin",
+        "x y",
+        [
             Holonomic("A.x", x - L * cos(theta)),
             Holonomic("A.y", y - L * sin(theta)),
             Nonholonomic("turn", theta.diff()),
@@ -38,8 +37,9 @@ def test_a_rod_spins_down_in_a_rubbing_pin(built):
                 "pin", ["turn"], norm(multiplier("A.x"), multiplier("A.y")), 2 * mu * r, mu * r
             ),
         ],
+        angles="theta",
+        mass=2.0,
         parameters=[
-            Parameter(m, 2.0, "kg"),
             Parameter(L, 0.5, "m"),
             Parameter(r, 0.1, "m"),
             Parameter(mu, 0.8, "1"),
@@ -79,19 +79,17 @@ def test_a_puck_that_turns_downhill(built):
     """On a plane of slope tan(alpha) = mu friction takes from the speed what gravity gives downhill: |v| + x'
     stays, however the path bends (x downhill)."""
     z = dynamicsymbols("z")
-    puck = Model(
-        name="Downhill",
-        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2 + z.diff() ** 2) / 2
-        - m * G * (z * cos(alpha) - x * sin(alpha)),
-        coordinates={x: "m", y: "m", z: "m"},
-        constraints=[
+    puck = point_mass(
+        "Downhill",
+        "x y z",
+        [
             Contact("table", z),
             Nonholonomic("along", x.diff()),
             Nonholonomic("across", y.diff()),
             Friction("grip", ["along", "across"], multiplier("table"), sin(alpha) / cos(alpha)),
         ],
+        energy=-m * G * (z * cos(alpha) - x * sin(alpha)),
         parameters=[
-            Parameter(m, 1.0, "kg"),
             Parameter(G, 9.81, "m/s^2"),
             Parameter(alpha, 0.3, "rad"),
             Parameter(u, 0.5, "m/s"),

@@ -11,11 +11,12 @@ from instance import instance
 from runs import evenly
 from sympy import Abs, sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
+from zoo import point_mass
 
 from lagfmu import Model, Output, Parameter, Scene
 
 x, y = dynamicsymbols("x y")
-m, k, L, c, g = symbols("m k L c g", positive=True)
+m, k, L, c = symbols("m k L c", positive=True)
 K, LENGTH, START = 40.0, 0.5, 1.2
 RATE = math.sqrt(K)
 STENCIL = ((-2, 1 / 12), (-1, -8 / 12), (1, 8 / 12), (2, -1 / 12))  # central, of fourth order
@@ -103,12 +104,12 @@ def test_drag_begins_at_rest(built: Any) -> None:
     """Of sqrt(x'^2 + y'^2) (x', y') there are derivatives at rest, 0, though the root has none.  A fall with
     it has y = -(m/c) ln cosh(t sqrt(c g/m)), and no jump is seen in it; the speed itself has none at rest."""
     speed = sqrt(x.diff() ** 2 + y.diff() ** 2)
-    model = Model(
-        name="Falling",
-        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2 - m * g * y,
-        coordinates={x: "m", y: "m"},
+    model = point_mass(
+        "Falling",
+        "x y",
+        up=y,
+        parameters=[NUMBERS[0], Parameter(c, 0.3, "kg/m")],
         forces={x: -c * speed * x.diff(), y: -c * speed * y.diff()},
-        parameters=[NUMBERS[0], Parameter(c, 0.3, "kg/m"), Parameter(g, 9.81, "m/s^2")],
         outputs=[Output("speed", speed, "m/s")],
     )
     fmu = built(model, Scene("Falling", sensitivities=("y,speed:c,g",)))

@@ -15,6 +15,7 @@ from instance import instance
 from runs import evenly
 from sympy import Abs, symbols
 from sympy.physics.mechanics import dynamicsymbols
+from zoo import point_mass
 
 from lagfmu import Model, Output, Parameter, Peak, Scene
 
@@ -155,16 +156,11 @@ def test_extremes_of_a_friction(varied: Varied) -> None:
 
 def swing(*outputs: Any) -> Model:
     """m x'' = -k x with m = 1 kg, k = 1 N/m, from x = 1 m at rest; and a = 0, b = 2 m, for outputs."""
-    return Model(
-        name="Swing",
-        lagrangian=m * x.diff() ** 2 / 2 - k * x**2 / 2,
-        coordinates={x: "m"},
-        parameters=[
-            Parameter(m, 1.0, "kg"),
-            Parameter(k, 1.0, "N/m"),
-            Parameter(A, 0.0, "m"),
-            Parameter(B, 2.0, "m"),
-        ],
+    return point_mass(
+        "Swing",
+        "x",
+        energy=-k * x**2 / 2,
+        parameters=[Parameter(k, 1.0, "N/m"), Parameter(A, 0.0, "m"), Parameter(B, 2.0, "m")],
         outputs=outputs,
         start={x: 1.0},
     )

@@ -11,6 +11,7 @@ from instance import instance
 from runs import simulate_fmu
 from sympy import cos, symbols
 from sympy.physics.mechanics import dynamicsymbols
+from zoo import point_mass
 
 from lagfmu import Contact, Friction, Model, Nonholonomic, Parameter, multiplier
 from lagfmu.bodies import Body, Ground, Prismatic, SpringDamper, mechanism
@@ -23,22 +24,22 @@ BALL = [Parameter(m, 1.0, "kg"), Parameter(g, 9.81, "m/s^2"), Parameter(e, 0.5, 
 
 
 def far_centre(height: float = 1.0) -> Model:
-    return Model(
-        name="FarCentre",
-        lagrangian=m * z.diff() ** 2 / 2 + m * g * Re**2 / (Re + z),
-        coordinates={z: "m"},
-        constraints=[Contact("floor", z, restitution=e)],
+    return point_mass(
+        "FarCentre",
+        "z",
+        [Contact("floor", z, restitution=e)],
+        energy=m * g * Re**2 / (Re + z),
         parameters=[*BALL, Parameter(Re, 6.378e6, "m")],
         start={z: height},
     )
 
 
 def near_floor(near: float = 1e-9, place: float = 0.0, speed: float = 10.0) -> Model:
-    return Model(
-        name="NearFloor",
-        lagrangian=m * (x.diff() ** 2 + z.diff() ** 2) / 2 - m * g * z,
-        coordinates={x: "m", z: "m"},
-        constraints=[Contact("floor", z - X0, restitution=e)],
+    return point_mass(
+        "NearFloor",
+        "x z",
+        [Contact("floor", z - X0, restitution=e)],
+        up=z,
         parameters=[*BALL, Parameter(X0, near, "m")],
         start={x: place, z: 1.0, x.diff(): speed},
     )
@@ -79,11 +80,11 @@ def test_motion_along_a_floor_ends_no_bounce(built, target, near, place):
 
 def shifted(height: float, by: float) -> Model:
     """A ball `height` above a floor at `by`."""
-    return Model(
-        name="Shifted",
-        lagrangian=m * z.diff() ** 2 / 2 - m * g * (z - X0),
-        coordinates={z: "m"},
-        constraints=[Contact("floor", z - X0, restitution=e)],
+    return point_mass(
+        "Shifted",
+        "z",
+        [Contact("floor", z - X0, restitution=e)],
+        up=z - X0,
         parameters=[*BALL, Parameter(X0, by, "m")],
         start={z: height + by},
     )
@@ -118,12 +119,12 @@ def test_a_fast_force_beside_a_long_length(built, target, unused, place):
     """F cos(w t) on a free mass moves it by F/(m w^2) (1 - cos(w t)), whatever length stands in the model and
     wherever it begins."""
     rate = 1000.0
-    model = Model(
-        name="Shaken",
-        lagrangian=m * x.diff() ** 2 / 2 + 0 * X0,
-        forces={x: F * cos(w * t)},
-        coordinates={x: "m"},
+    model = point_mass(
+        "Shaken",
+        "x",
+        energy=0 * X0,
         parameters=[*SHAKEN, Parameter(X0, unused, "m")],
+        forces={x: F * cos(w * t)},
         start={x: place},
     )
     with instance(built(model, target=target)) as one:
@@ -137,15 +138,15 @@ def test_a_fast_force_beside_a_long_length(built, target, unused, place):
 @pytest.mark.parametrize("far", [1e-9, 6.378e6])
 def test_friction_sees_no_far_length_either(built, far):
     """The floor bears m g t in all, so that a ball that slips on it at 10 m/s has lost mu g t at rest."""
-    model = Model(
-        name="Rough",
-        lagrangian=m * (x.diff() ** 2 + z.diff() ** 2) / 2 + m * g * Re**2 / (Re + z),
-        coordinates={x: "m", z: "m"},
-        constraints=[
+    model = point_mass(
+        "Rough",
+        "x z",
+        [
             Contact("floor", z, restitution=e),
             Nonholonomic("foot", x.diff(), while_closed="floor"),
             Friction("grip", of=["foot"], normal=multiplier("floor"), static=mu),
         ],
+        energy=m * g * Re**2 / (Re + z),
         parameters=[
             *BALL,
             Parameter(Re, 6.378e6, "m"),

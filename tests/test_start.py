@@ -17,6 +17,7 @@ from linkages import pinned_rod
 from sympy import cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 from typer.testing import CliRunner
+from zoo import point_mass
 
 from lagfmu import Holonomic, Model, Parameter, Scene, simulate, sweep
 from lagfmu.errors import ModelError, SimulationError
@@ -324,22 +325,16 @@ def test_a_start_that_is_infinite_at_what_is_set_is_refused(target: str, built: 
 def test_what_has_no_start_has_one_as_soon_as_something_else_is_set(built: Built) -> None:
     """A bob on a rod of L = 1 m and a rail at y = H + V t: above the rod's end there is no place for it, and
     each question is told so; below it, after a reset and in a state saved before, x = sqrt(L^2 - y^2)."""
-    m, g, L, H, V = symbols("m g L H V", positive=True)
-    model = Model(
-        name="Railed",
-        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2 - m * g * y,
-        coordinates={x: "m", y: "m"},
-        constraints=[
+    L, H, V = symbols("L H V", positive=True)
+    model = point_mass(
+        "Railed",
+        "x y",
+        [
             Holonomic("rod", x**2 + y**2 - L**2),
             Holonomic("rail", y - H - V * dynamicsymbols._t),
         ],
-        parameters=[
-            Parameter(m, 1.0, "kg"),
-            Parameter(g, 9.81, "m/s^2"),
-            Parameter(L, 1.0, "m"),
-            Parameter(H, 0.6, "m"),
-            Parameter(V, 0.1, "m/s"),
-        ],
+        up=y,
+        parameters=[Parameter(L, 1.0, "m"), Parameter(H, 0.6, "m"), Parameter(V, 0.1, "m/s")],
         start={x: 0.8, y: 0.6},
     )
     fmu = built(model, Scene("Railed", tolerance=1e-9))

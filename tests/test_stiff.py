@@ -10,6 +10,7 @@ from conftest import FILES, of_each_kind
 from instance import instance
 from sympy import sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
+from zoo import point_mass
 
 from lagfmu import Contact, Holonomic, Model, Parameter
 from lagfmu.testing import Session
@@ -63,16 +64,13 @@ def elastic():
     """A pendulum on a spring that is stretched at the start and rings at sqrt(k/m), ten times as fast as
     it swings."""
     r = sqrt(x**2 + y**2)
-    return Model(
-        name="Elastic",
-        lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2 - m * g * y - k * (r - a) ** 2 / 2,
-        coordinates={x: "m", y: "m"},
-        parameters=[
-            Parameter(m, 1.0, "kg"),
-            Parameter(g, G, "m/s^2"),
-            Parameter(k, 1e3, "N/m"),
-            Parameter(a, 1.0, "m"),
-        ],
+    return point_mass(
+        "Elastic",
+        "x y",
+        up=y,
+        energy=-k * (r - a) ** 2 / 2,
+        gravity=G,
+        parameters=[Parameter(k, 1e3, "N/m"), Parameter(a, 1.0, "m")],
         start={x: 0.8, y: -0.7},
     )
 

@@ -5,8 +5,9 @@ import pytest
 from sympy import symbols
 from sympy.physics.mechanics import dynamicsymbols
 from typer.testing import CliRunner
+from zoo import point_mass
 
-from lagfmu import Model, Parameter, Scene, show, verify
+from lagfmu import Parameter, Scene, show, verify
 from lagfmu.bodies import Body, Gravity, Ground, Motor, Revolute, SpringDamper, mechanism
 from lagfmu.errors import LagfmuWarning, ModelError, SettingError
 from lagfmu.testing import app, read_table
@@ -49,10 +50,10 @@ def test_a_parameter_that_stands_nowhere_is_told():
     """Nothing depends on it, whatever it was meant for; one that only a start or an output needs is used."""
     x = dynamicsymbols("x")
     m, k, x0, Re = symbols("m k x0 Re", positive=True)
-    model = Model(
-        name="Spring",
-        lagrangian=m * x.diff() ** 2 / 2 - k * x**2 / 2,
-        coordinates={x: "m"},
+    model = point_mass(
+        "Spring",
+        "x",
+        energy=-k * x**2 / 2,
         parameters=[
             *(Parameter(s, 1.0, u) for s, u in ((m, "kg"), (k, "N/m"), (x0, "m"))),
             Parameter(Re, 6.378e6, "m"),

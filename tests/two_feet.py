@@ -2,11 +2,12 @@
 
 from sympy import cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
+from zoo import point_mass
 
-from lagfmu import Contact, Friction, Model, Nonholonomic, Parameter, multiplier
+from lagfmu import Contact, Friction, Nonholonomic, Parameter, multiplier
 
 x, y, theta = dynamicsymbols("x y theta")
-m, g, a, h, J = symbols("m g a h J", positive=True)
+a, h, J = symbols("a h J", positive=True)
 mu, alpha, e = symbols("mu alpha e", nonnegative=True)
 
 
@@ -22,16 +23,14 @@ def foot(name, side):
     ]
 
 
-model = Model(
-    name="TwoFeet",
-    lagrangian=m * (x.diff() ** 2 + y.diff() ** 2) / 2
-    + J * theta.diff() ** 2 / 2
-    - m * g * (y * cos(alpha) - x * sin(alpha)),
-    coordinates={x: "m", y: "m", theta: "rad"},
-    constraints=[*foot("low", 1), *foot("up", -1)],
+model = point_mass(
+    "TwoFeet",
+    "x y",
+    [*foot("low", 1), *foot("up", -1)],
+    angles="theta",
+    up=y * cos(alpha) - x * sin(alpha),
+    energy=J * theta.diff() ** 2 / 2,
     parameters=[
-        Parameter(m, 1.0, "kg"),
-        Parameter(g, 9.81, "m/s^2"),
         Parameter(a, 1.0, "m"),
         Parameter(h, 0.5, "m"),
         Parameter(J, 0.3, "kg.m^2"),
