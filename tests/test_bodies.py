@@ -743,8 +743,8 @@ pin = Revolute("A", ground.at((0, 0)), arm.at((0, 0)))
     ("parts", "told"),
     [
         (
-            {"bodies": [Body("b", 0, 0.1)]},
-            "body 'b' has the mass 0, expected a positive number in kg",
+            {"bodies": [Body("b", -1, 0.1)]},
+            "body 'b' has the mass -1, expected a positive number in kg, or 0 where joints",
         ),
         ({"bodies": [Body("b", 1, -0.1)]}, "body 'b' has the inertia -0.1"),
         (
@@ -902,10 +902,10 @@ def test_what_is_wrong_with_a_mechanism_is_told_by_name(parts, told):
 
 
 def test_all_that_is_wrong_is_told_at_once():
-    """A massless body, a joint on a body that is not there, a motor of no joint."""
+    """A negative mass, a joint on a body that is not there, a motor of no joint."""
     with pytest.raises(ModelError) as caught:
         plane(
-            bodies=[Body("b", 0, 0.1)],
+            bodies=[Body("b", -1, 0.1)],
             joints=[pin],
             loads=[Motor("motor", "Z")],
         )

@@ -16,10 +16,6 @@ BOMB = "".join(f'<!ENTITY e{k + 1} "{f"&e{k};" * 10}">' for k in range(12))
 BOMB = f'<!DOCTYPE r [<!ENTITY e0 "lol">{BOMB}]>'
 XXE = '<!DOCTYPE r [<!ENTITY e SYSTEM "file:///etc/passwd">]>'
 DOCTYPE = "has a DOCTYPE, whose entities are not read: write what they stand for in place"
-LINE = (
-    '<inertia ixx="0.8888888888888888" iyy="0.5555555555555556" izz="0.5555555555555557" '
-    'ixy="-0.2222222222222222" ixz="-0.2222222222222222" iyz="-0.4444444444444444"/>'
-)
 LIMIT = '<limit lower="{}" upper="{}"/>'
 
 
@@ -103,15 +99,27 @@ URDF: dict[str, tuple[str, str]] = {
     ),
     "no mass": (
         text(BASE, link("a", ""), HINGE),
-        "link 'a' moves and has no mass: give it an <inertial> with mass and inertia",
+        "link 'a' moves and has no mass, nor does it carry one: give it an <inertial> with mass",
     ),
     "an impossible inertia": (
         text(BASE, link("a", MASS.replace('izz="1"', 'izz="9"')), HINGE),
         "body 'a' has the principal moments of inertia 1, 1, 9 .*none is above the sum",
     ),
-    "the inertia of a line": (  # along (1, 2, 2), but for rounding: its forces would be noise
-        text(BASE, link("a", f'<inertial><mass value="1"/>{LINE}</inertial>'), HINGE),
-        "body 'a' has the principal moments of inertia .*, expected positive ones",
+    "a negative inertia": (
+        text(BASE, link("a", MASS.replace('ixx="1"', 'ixx="-1"')), HINGE),
+        "body 'a' has the inertia xx -1.0, expected a positive number in kg.m.2, or 0 where",
+    ),
+    "no mass on its branch": (
+        text(
+            BASE,
+            link("a"),
+            link("b", ""),
+            link("c", ""),
+            HINGE,
+            joint("k", "a", "b"),
+            joint("l", "b", "c"),
+        ),
+        "link 'b' moves and has no mass, nor does it carry one.*link 'c' moves",
     ),
     "another kind": (
         with_hinge(old="revolute", new="screw"),

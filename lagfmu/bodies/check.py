@@ -195,7 +195,7 @@ def _of_references(part: Any, parts: Sequence[Any]) -> Iterator[str]:
 PARTS = (Joint, Distance, PointOnCurve, Rolling, Gear, Contact)
 PARTS += (Gravity, SpringDamper, Torsion, Force, Torque, Motor, Rotor)  # type: ignore[assignment]
 ROUNDED = 1e-3  # of the largest moment, by which an inertia may miss an inequality
-SINGULAR = 1e-12  # of the largest moment: the least that is none
+SINGULAR = 1e-12  # of the largest moment: how far below 0 another is rounding
 PLANES = (None, "xy")
 
 
@@ -274,11 +274,10 @@ def _of_body(body: Body, planar: bool) -> Iterator[str]:
         yield from _of_tensor(what, body.inertia)
     for of, value, unit in masses:
         number = _value_of(value)
-        if is_number(number) and not float(number) > 0:
+        if is_number(number) and not float(number) >= 0:
             yield (
-                f"{what} has the {of} {number!r}, expected a positive number in {unit}: what has none cannot "
-                "move by itself: put its markers on the body that it belongs to, or use Distance for a rod "
-                "without mass"
+                f"{what} has the {of} {number!r}, expected a positive number in {unit}, or 0 where joints to "
+                "others say how it moves: correct it"
             )
 
 
@@ -300,12 +299,12 @@ def _of_shape(body: Body | Ground, planar: bool) -> Iterator[str]:
 def _of_tensor(what: str, inertia: Sequence[Any]) -> Iterator[str]:
     """The principal moments of a rigid body satisfy the triangle inequality."""
     values = [_value_of(x) for x in inertia]
-    if not all(map(is_number, values)) or min(map(float, values[:3])) <= 0:
+    if not all(map(is_number, values)) or min(map(float, values[:3])) < 0:
         return
     xx, yy, zz, xy, xz, yz = [*map(float, values), 0.0, 0.0, 0.0][:6]
     least, middle, most = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]).tolist()
     missed = most - (least + middle)
-    positive = least > SINGULAR * most
+    positive = least >= -SINGULAR * most
     if positive and 1e-9 * most < missed < ROUNDED * most:
         warnings.warn(
             f"{what}: its largest principal moment of inertia, {most!r} kg.m^2, is above the sum of the "
@@ -316,7 +315,7 @@ def _of_tensor(what: str, inertia: Sequence[Any]) -> Iterator[str]:
     elif not positive or missed > 1e-9 * most:
         yield (
             f"{what} has the principal moments of inertia {least:.6g}, {middle:.6g}, {most:.6g} kg.m^2, "
-            "expected positive ones of which none is above the sum of the others: no distribution of "
+            "expected none below 0, of which none is above the sum of the others: no distribution of "
             "mass has these; products of inertia are elements of the tensor, -sum m x y"
         )
 

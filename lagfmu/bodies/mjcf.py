@@ -218,11 +218,6 @@ class _Reader:
             J = axes @ np.diag(m.body_inertia[b]) @ axes.T
             found.append((float(m.body_mass[b]), center, J))
         mass, center, J = together(found)
-        if not mass > 0 or not np.linalg.eigvalsh(J)[0] > 0:
-            self.problems.append(
-                f"body {self._own('body', root)!r} moves and has the mass {mass!r} and the principal moments "
-                f"{np.linalg.eigvalsh(J).tolist()!r}: give it an <inertial>, or a geom with a mass"
-            )
         own = self._own("body", root)
         description = "" if own == name else f"{own!r} of the file"
         shape = self._looks(those) or None

@@ -107,7 +107,7 @@ TRIES = 12  # beginnings with other omitted values, where the first leads nowher
 FEW = 4  # ... until so many close
 STILL = 1e-6  # relative: rows that close to CLOSED leave such a motion
 LEAST = 1e-6  # of the way back: a gain that is none
-LIGHT = 1e-6  # what resists a parameter of a curve, which has no mass, of that of the body
+LIGHT = 1e-6  # what resists what has no mass: a curve's parameter, of its body's; a body, of the heaviest's
 REDUNDANT = 1e-11  # a singular value, relative to the largest: rows that say the same
 DENSE = 200  # speeds up to which dense algebra is as quick
 YIELDING, YIELDS = 1e-5, 10  # of a row: its slack; how often at most what is left is done
@@ -128,8 +128,11 @@ class Moving:
             for b in draft.motions.values()
             for d, m in zip(b.directions, b.masses, strict=True)
         } | {s: LIGHT * of.mass for s, of in draft.curves.items()}
-        self.weight = np.sqrt(numbers_of(model, [masses[d] for d in model.directions]))
         self.lengths = np.array([model.coordinates.get(d) == "m" for d in model.directions])
+        own = numbers_of(model, [masses[d] for d in model.directions])
+        for alike in (self.lengths, ~self.lengths):
+            own[alike & (own == 0)] = LIGHT * own[alike].max(initial=0.0) or 1.0
+        self.weight = np.sqrt(own)
         self.scale = np.ones(len(self.lengths))  # what is much of each speed, in a second
         rates = [model.kinematics.get(q, q.diff(TIME)) for q in model.coordinates]
         self._moved = Rows(model, [(sp.S.Zero, rate) for rate in rates])

@@ -168,6 +168,7 @@ def _in_space(
     found = None
     if mass is not None and len(known) == len(numbers):
         found = solid(mass, known[:6], known[6:], reach)
+    if found is not None:
         yield _carried(draft, motion, found)
     for placed in markers:
         arm = [x for x in (_value(draft, x) for x in placed.arm) if x is not None]

@@ -43,9 +43,13 @@ class PlaneMotion(Motion):
         self.velocity = (x.diff(TIME), y.diff(TIME), sp.S.Zero)
         self.spin = (sp.S.Zero, sp.S.Zero, self.angle.diff(TIME))
         self._center = draft.vector(body.center, f"{name}.center", "m", "centre of mass")
-        m = draft.number(body.mass, f"{name}.mass", "kg", f"mass of {name}", positive=True)
+        m = draft.number(
+            body.mass, f"{name}.mass", "kg", f"mass of {name}", positive=body.mass != 0
+        )
         text = f"moment of inertia of {name} about its centre of mass"
-        J = draft.number(body.inertia, f"{name}.inertia", "kg.m^2", text, positive=True)
+        J = draft.number(
+            body.inertia, f"{name}.inertia", "kg.m^2", text, positive=body.inertia != 0
+        )
         self.mass, self.masses = m, (m, m, J)
         self.descriptions = {
             **{s: f"{a} of the centre of mass of {name}" for s, a in ((x, "x"), (y, "y"))},

@@ -23,17 +23,22 @@ THIN = 0.02  # of its largest side: the least that is drawn of another
 NEXT = 1.1  # times its size: what is next to a solid
 
 
-def solid(mass: float, inertia: Sequence[float], center: Any, reach: float) -> Box | Rod | Sphere:
+def solid(
+    mass: float, inertia: Sequence[float], center: Any, reach: float
+) -> Box | Rod | Sphere | None:
     """The solid about `center` [m] of a body of `mass` [kg] with the inertia xx, yy, zz, xy, xz, yz [kg.m^2].
 
     One that is larger than `reach` [m], which the mechanism's dimensions suggest, is drawn smaller in
-    proportion; 0 says nothing.
+    proportion; 0 says nothing.  A mass without inertia is a small sphere; without mass there is none.
     """
     xx, yy, zz, xy, xz, yz = inertia
     J, axes = np.linalg.eigh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    J = np.maximum(J, 0.0)  # of a line one is rounding
     if np.linalg.det(axes) < 0:
         axes[:, 0] *= -1
     center = np.array(center, dtype=float)
+    if not mass > 0 or not J[2] > 0:
+        return Sphere(tuple(center), THIN * reach) if mass > 0 and reach > 0 else None
     near = EQUAL * J[2]
     if J[2] - J[0] < near:
         return Sphere(tuple(center), _within(np.sqrt(10 * J / mass), reach)[0] / 2)

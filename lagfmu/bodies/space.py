@@ -69,14 +69,16 @@ class SpaceMotion(Motion):
 
     def _inertia(self, draft: Draft, body: Body, w: Vector) -> None:
         name = body.name
-        m = draft.number(body.mass, f"{name}.mass", "kg", f"mass of {name}", positive=True)
+        m = draft.number(
+            body.mass, f"{name}.mass", "kg", f"mass of {name}", positive=body.mass != 0
+        )
         J = [
             draft.number(
                 value,
                 f"{name}.inertia.{pair}",
                 "kg.m^2",
                 f"inertia of {name}, {pair}",
-                pair[0] == pair[1],
+                value != 0 and pair[0] == pair[1],
             )
             for pair, value in zip(PAIRS, body.inertia, strict=False)
         ]

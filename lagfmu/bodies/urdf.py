@@ -53,6 +53,7 @@ KINDS: dict[str, Any] = {
 }
 WITHOUT_AXIS = ("fixed", "spherical")
 BASES = ("fixed", "floating")
+ROUNDING = 1e-15  # of the largest inertia of a file: what programs leave of one that is 0
 UP = np.array([0.0, 0.0, 1.0])
 Pose = NDArray[np.float64]  # (4, 4) homogeneous
 
@@ -87,8 +88,8 @@ def from_urdf(
     With base='floating' the root link moves freely.  Without `fold_fixed` each link that is fixed to another,
     and has mass and inertia, is a body, so that the wrench between them is told.
 
-    Raises ModelError with every problem at once: what is no number, links without inertia that move, joints
-    of a kind that there is not, links with two parents or none, names that become one.
+    Raises ModelError with every problem at once: what is no number, links that move and carry no mass,
+    joints of a kind that there is not, links with two parents or none, names that become one.
     """
     if base not in BASES:
         raise ModelError(Path(file).name, [f"base is {base!r}, expected 'fixed' or 'floating'"])
@@ -175,6 +176,7 @@ class _Builder:
     def _bodies(self) -> dict[str, Body | Ground]:
         """Of each link that is its own carrier, with what is fixed to it."""
         found: dict[str, Body | Ground] = {}
+        largest = max(np.abs(_tensor(link)).max() for link in self.robot.links)
         for name in self.own:
             parts = [(self.links[n], pose) for n, (on, pose) in self.carrier.items() if on == name]
             shapes = [shape for link, pose in parts for shape in _shapes(link, pose)] or None
@@ -182,19 +184,34 @@ class _Builder:
                 found[name] = Ground(shape=shapes)
                 continue
             mass, center, J = together([*_inertias(parts)])
-            if not mass > 0 or not (np.diag(J) > 0).all():
-                what = "mass" if not mass > 0 else "inertia"
-                self.problems.append(
-                    f"link {name!r} moves and has no {what}: give it an <inertial> with mass and inertia, or "
-                    "a fixed joint to a link that has one"
-                    + ("; or leave base='floating' out" if name == self.root else "")
-                )
+            if np.abs(J).max() <= ROUNDING * largest:
+                J = np.zeros((3, 3))
             word = self.words.links.get(name, name)
             told = f"link {name!r} of the file" if word != name else ""
             found[name] = Body(
                 word, mass, components(J), tuple(map(float, center)), description=told, shape=shapes
             )
+        self._check_idle(found)
         return found
+
+    def _check_idle(self, bodies: dict[str, Body | Ground]) -> None:
+        """Links that move though neither they nor those that they carry have a mass; what follows another
+        joint, or is followed, is held by that."""
+        heavy = {n for n, b in bodies.items() if isinstance(b, Body) and (b.mass or any(b.inertia))}
+        mimics = [j for j in self.joints if j.mimic is not None]
+        tied = {n for j in mimics for n in (j.name, j.mimic.joint)}
+        moves = {j.child: j for j in self.joints}
+        for j in reversed(self.joints):
+            if self.carrier[j.child][0] in heavy:
+                heavy.add(self.carrier[j.parent][0])
+        for name in (n for n, b in bodies.items() if isinstance(b, Body) and n not in heavy):
+            if name in moves and moves[name].name in tied:
+                continue
+            self.problems.append(
+                f"link {name!r} moves and has no mass, nor does it carry one: give it an <inertial> with "
+                "mass and inertia, or a fixed joint to a link that has one"
+                + ("; or leave base='floating' out" if name == self.root else "")
+            )
 
     def parts(self, left: str) -> Parts:
         """The whole of it."""

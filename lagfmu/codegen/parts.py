@@ -9,7 +9,7 @@ tangent is the change of a function's results along a direction in t, q, v, u an
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -300,8 +300,10 @@ class Parts:
             found.append(Function("starts", text, {"p": eom.p}, {"w": w}))
         if any(x.expression != 0 for x in groups["f"]) and not eom.bare:
             text = "The largest magnitude among the terms of each f: of what f is rounding."
+            turns = frozenset(eom.q[j] for j in eom.unwrapped)
             terms = _values(
-                [_magnitude(x.expression) for x in groups["f"]], [x.place for x in groups["f"]]
+                [_magnitude(x.expression, turns) for x in groups["f"]],
+                [x.place for x in groups["f"]],
             )
             found.append(Function("terms", text, still, {"term": terms}))
         if eom.sides and not eom.bare:
@@ -418,18 +420,18 @@ class Largest(sp.Function):  # type: ignore[misc]
     """The largest of its arguments; unlike sp.Max it compares none of them, which takes SymPy seconds."""
 
 
-def _magnitude(e: Expr) -> Expr:
+def _magnitude(e: Expr, turns: Collection[Expr] = ()) -> Expr:
     """The largest magnitude among the terms of which e is made, those of its factors with them; a sine
-    or cosine stands beside 1."""
+    or cosine stands beside 1, and so does an angle that turns with an attitude, whose parts round it."""
     if isinstance(e, sp.Add):
-        return _largest([_magnitude(a) for a in e.args])
+        return _largest([_magnitude(a, turns) for a in e.args])
     if isinstance(e, sp.Mul):
-        return sp.Mul(*map(_magnitude, e.args))
+        return sp.Mul(*(_magnitude(a, turns) for a in e.args))
     if isinstance(e, sp.Pow) and e.exp.is_positive and e.exp.is_number:
-        return sp.Pow(_magnitude(e.base), e.exp)
+        return sp.Pow(_magnitude(e.base, turns), e.exp)
     if isinstance(e, (sp.sin, sp.cos)):
         return sp.S.One
-    return sp.Abs(e)
+    return _largest([sp.Abs(e), sp.S.One]) if e in turns else sp.Abs(e)
 
 
 def _largest(magnitudes: Sequence[Expr]) -> Expr:

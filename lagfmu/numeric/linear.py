@@ -264,18 +264,31 @@ def _least_norm(
     n, (d, K) = len(b), _equilibrated(M, G)
     U, sigma, Vt = np.linalg.svd(K * d * d[:, None])
     kept = sigma > least * sigma[0]
-    free = np.abs(Vt[~kept, :n]).max(axis=0, initial=0.0) > VANISHES
-    if held and free.any():
+    free = _idle(Vt[~kept, :n])
+    if held and free:
         raise MasslessError(
             "the mass matrix is singular on the constraint surface: a coordinate has neither mass nor a "
             "constraint that determines its acceleration",
-            np.flatnonzero(free).tolist(),
+            free,
         )
     right = np.concatenate([b, c]) * d
     if agree and np.abs(U[:, ~kept].T @ right).max(initial=0.0) > CONSISTENT * np.abs(right).max():
         raise StepFailureError(CONTRADICTION)
     z = Vt[kept].T @ ((U[:, kept].T @ right) / sigma[kept]) * d
     return z[:n], -z[n:]
+
+
+def massless(M: Matrix, G: Matrix) -> list[int]:
+    """The coordinates that can accelerate without mass and without violating a constraint."""
+    d, K = _equilibrated(M, G)
+    _, sigma, Vt = np.linalg.svd(K * d * d[:, None])
+    return _idle(Vt[sigma <= RANK * sigma.max(initial=0.0), : len(M)])
+
+
+def _idle(null: Matrix) -> list[int]:
+    """The coordinates that take part in vectors of the null space of the KKT matrix."""
+    found: list[int] = np.flatnonzero(np.abs(null).max(axis=0, initial=0.0) > VANISHES).tolist()
+    return found
 
 
 def independent(M: Sparse, G: Sparse) -> list[int]:

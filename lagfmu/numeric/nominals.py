@@ -131,17 +131,21 @@ def natural(
     rate = max(_rate(system, span, told, pull, span > 0), fastest)
     rate = rate or _rate(system, span, speed, felt, span > 0)
     span = in_speeds(system, size)
-    own = np.sqrt(span * _beyond_rounding(now))
+    own = np.sqrt(span * _beyond_rounding(system, now))
     natural = span * rate
     return size, rate, np.where((own > 0) & ((own < natural) | (natural == 0)), own, natural)
 
 
-def _beyond_rounding(now: Motion) -> Vector:
+def _beyond_rounding(system: System, now: Motion) -> Vector:
     """What is felt (nv), but 0 where it is rounding of what the others feel, compared as sqrt(mass) times
-    acceleration: out of the plane in which a mechanism moves no force acts."""
+    acceleration: out of the plane in which a mechanism moves no force acts.  What has no mass is compared
+    with what has its dimension."""
     mass, felt = now.M.diagonal(), now.felt
     strength = np.sqrt(np.maximum(mass, 0.0)) * felt
-    lost = (mass > 0) & (strength <= LOST * strength.max(initial=0.0))
+    most = np.where(
+        mass > 0, strength.max(initial=0.0), _largest_alike(system, felt, system.speed_dimension)
+    )
+    lost = np.where(mass > 0, strength, felt) <= LOST * most
     return np.where(lost, 0.0, felt)
 
 

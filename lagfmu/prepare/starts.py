@@ -19,7 +19,7 @@ from ..interface.variables import VariableTable
 from ..numeric.failure import StepFailureError
 from ..numeric.initialization import initial_positions
 from ..numeric.instant import Instant
-from ..numeric.linear import blocks
+from ..numeric.linear import blocks, massless
 from ..numeric.start_priority import GIVEN, LEFT_OUT, OMITTED, Moved, left_out
 from ..numeric.system import Matrix, Sparse, System, Vector
 from ..numeric.thresholds import RANK
@@ -98,15 +98,16 @@ def cause_of_failure(at: Instant, q: Vector, v: Vector) -> str | None:
         if negative:
             return negative
         rows = list(system.permanent)
-        loose = _massless(system, M, G[rows])
+        loose = massless(M.toarray(), G[rows].toarray())
         if loose:
-            remedy = "give it a mass, or a constraint"
+            moving = ", ".join(repr(system.directions[j]) for j in loose)
+            remedy = "give it a mass (what turns, an inertia), or a constraint"
             aside = q + 0.1 * np.maximum(np.abs(q).max(initial=0.0), 1.0)
             M, _, G, _, _ = at.equations(aside, v)
-            if not _massless(system, M, G[rows]):
+            if not massless(M.toarray(), G[rows].toarray()):
                 remedy = f"elsewhere it has: start at another place than {values}, or take other coordinates"
             return (
-                f"the mass matrix is singular on the constraint surface: {loose} has neither mass "
+                f"the mass matrix is singular on the constraint surface: {moving} has neither mass "
                 f"nor a constraint that determines its acceleration; {remedy}"
             )
         if _projected(at, q, v, rows) is None:
@@ -154,15 +155,6 @@ def negative_energy(system: System, M: Sparse, size: Vector) -> str:
         f"the kinetic energy is negative where {moving} move together: the mass matrix, scaled to a "
         f"diagonal of 1, has the eigenvalue {least:.6g} {remedy}"
     )
-
-
-def _massless(system: System, M: Sparse, G: Sparse) -> str:
-    """Names of coordinates that can accelerate without mass and without violating a constraint."""
-    rows = [a / (np.abs(a).max(initial=0.0) or 1.0) for a in (*M.toarray(), *G.toarray())]
-    _, sizes, V = np.linalg.svd(np.array(rows))
-    free = V[len(sizes) :].tolist() + V[: len(sizes)][sizes < RANK].tolist()
-    loose = sorted({j for direction in free for j, a in enumerate(direction) if abs(a) > 1e-6})
-    return ", ".join(repr(system.directions[j]) for j in loose)
 
 
 def _projected(at: Instant, q: Vector, v: Vector, rows: list[int]) -> Vector | None:

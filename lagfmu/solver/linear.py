@@ -24,6 +24,7 @@ from ..numeric.system import Matrix, Vector
 
 INDEPENDENT = 1e-10  # of the largest singular value: smaller ones are rounding of redundant rows
 LIGHT = 1e-15  # of the largest mass: a smaller one hides what others are held by
+SLIGHT = 1e-8  # of a row's largest element: one so small is rounding of 0
 ALONE = (
     1e-6  # part that a multiplier may have in lambda that push nothing, and still be called unique
 )
@@ -97,15 +98,19 @@ def solve(
 
 
 def _scale(M: Matrix, G: Matrix) -> Vector:
-    """D (n): diag(M)^(-1/2); without a mass of its own a coordinate counts as the others in its rows, and so
-    does one so light that the rows which hold it would seem alike."""
+    """D (n): diag(M)^(-1/2); without a mass of its own a coordinate counts as the others in its rows, those
+    that have one first, and so does one so light that the rows which hold it would seem alike."""
     mass = M.diagonal()
     heavy = mass > LIGHT * mass.max(initial=0.0)
     D = np.where(heavy, 1 / np.sqrt(np.where(heavy, mass, 1.0)), 0.0)
-    for j in np.flatnonzero(D == 0):
-        k = int(np.argmax(np.abs(G[:, j]))) if len(G) else -1
-        others = float(np.abs(G[k] * D).max()) if k >= 0 else 0.0
-        D[j] = others / abs(G[k, j]) if others > 0 and G[k, j] != 0 else 1.0
+    A = np.abs(G)
+    A = np.where(A.max(axis=1, initial=0.0)[:, None] * SLIGHT < A, A, 0.0)
+    while (D == 0).any():
+        others = (A * D).max(axis=1, initial=0.0)
+        per = np.where(A > 0, others[:, None] / np.where(A > 0, A, 1.0), 0.0).max(
+            axis=0, initial=0.0
+        )
+        D = np.where(D == 0, per if (per[D == 0] > 0).any() else 1.0, D)
     return D
 
 
