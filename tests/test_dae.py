@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import contextlib
 from ctypes import byref, c_bool, c_double, c_size_t, c_void_p
+from dataclasses import replace
 
 import fmpy
 import numpy as np
@@ -446,6 +447,34 @@ def test_two_feet_that_stick_share_their_force_as_an_importer_finds_it(path, tmp
     grips = [made.references[f"sticks.grip_{foot}"] for foot in ("low", "up")]
     assert made.fmu.getBoolean(grips) == [True, True]
     assert np.abs(found[-1, :n] - found[0, :n]).max() < 1e-9
+    made.close()
+
+
+@pytest.mark.filterwarnings("ignore::lagfmu.testing.RedundantConstraintWarning")
+def test_two_feet_that_are_pushed_slip_and_stick_together(path, tmp_path):
+    """6 N sin(6 t) along the incline: whichever foot an importer lets bear the force, both slip and stick
+    when the pair does, as in co-simulation."""
+    pytest.importorskip("sksundae", reason="pip install -e '.[test]'")
+    force = Parameter(symbols("P", positive=True), 6.0, "N")
+    rate = Parameter(w, 6.0, "rad/s")
+    pushed = replace(
+        two_feet.model,
+        name="Pushed",
+        forces={x: force.symbol * sin(w * t)},
+        parameters=[*two_feet.model.parameters, force, rate],
+    )
+    own = simulate(path(pushed), stop_time=2.0, step_size=0.05, tolerance=1e-12)
+    made = Importer(path(pushed), tmp_path, 1e-9)
+    found = solve(made, np.linspace(0, 2.0, 41), 1e-9)
+    columns = {made.names[k]: found[:, j] for j, k in enumerate(made.known)}
+    for name in (
+        f"{e}.grip_{foot}.count" for e in ("slipping", "sticking") for foot in ("low", "up")
+    ):
+        assert made.fmu.getInt32([made.references[name]])[0] == own[name][-1] == 2
+    for name in ("x", "der(x)", "lambda.low", "lambda.up"):
+        np.testing.assert_allclose(columns[name], own[name], atol=1e-7 * np.abs(own[name]).max())
+    both = [of["lambda.low_rests"] + of["lambda.up_rests"] for of in (columns, own)]
+    np.testing.assert_allclose(*both, atol=1e-8 * np.abs(both[1]).max())
     made.close()
 
 
