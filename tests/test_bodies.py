@@ -801,7 +801,7 @@ pin = Revolute("A", ground.at((0, 0)), arm.at((0, 0)))
                 "joints": [Fixed("W", ground.at((0, 0)), arm.at((0, 0)))],
                 "loads": [Torsion("S", "W")],
             },
-            "Torsion 'S': Fixed 'W' has no angle or position or both, expected one of none",
+            "Torsion 'S': Fixed 'W' has neither an angle nor a position, expected one of none",
         ),
         ({"joints": [pin, Gear("G", "A", "A", 2.0)]}, "Gear 'G' ties 'A' to itself"),
         ({"plane": "yz"}, "plane = 'yz', expected 'xy'"),

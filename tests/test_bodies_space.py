@@ -498,7 +498,7 @@ arm = Body("arm", 1.0, (0.1, 0.1, 0.1))
                 "joints": [Cylindrical("A", ground.at((0, 0, 0)), arm.at((0, 0, 0)))],
                 "loads": [Motor("motor", "A")],
             },
-            "Cylindrical 'A' has no angle or position or both, expected one of angle.A, position.A",
+            "Cylindrical 'A' turns and slides: one of the two is named, expected one of angle.A, position.A",
         ),
         (
             {"joints": [Universal("U", ground.at((0, 0, 0)), arm.at((0, 0, 0)), second_axis="x")]},

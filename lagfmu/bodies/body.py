@@ -26,6 +26,11 @@ def several(values: Any) -> Sequence[Any]:
     return values if isinstance(values, tuple | list) else (values,)
 
 
+def value_of(value: Any) -> Any:
+    """Of a Parameter its value, else what was given."""
+    return value.value if isinstance(value, Parameter) else value
+
+
 @dataclass(frozen=True, eq=False)
 class Marker:
     """A frame on a body: its origin `point` [m] and its axes, in the body's own frame.

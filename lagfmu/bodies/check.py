@@ -15,16 +15,16 @@ import sympy as sp
 
 from ..errors import LagfmuWarning
 from ..model.attitude import written_out
-from ..model.elements import NAME, Expr, Parameter, is_number
+from ..model.elements import NAME, Expr, is_number
 from ..model.model import Model
 from ..model.picture import Box, Track, points_of
 from ..model.spline import Spline
 from ..names import RESERVED
-from .body import Body, Ground, Marker, problem_of, several
+from .body import Body, Ground, Marker, problem_of, several, value_of
 from .contacts import Contact
 from .curves import PointOnCurve
 from .draft import Draft, Reading
-from .joints import Distance, Gear, Joint, Planar, Rolling, Screw, Universal, name_of_joint
+from .joints import Distance, Gear, Joint, Rolling, name_of_joint
 from .loads import Force, Gravity, Motor, Rotor, SpringDamper, Torque, Torsion
 from .motion import AXES, between
 from .picture import CARRIED, shapes_of
@@ -34,11 +34,6 @@ from .space import PAIRS
 def _kind_of(part: Any) -> str:
     """Revolute, Motor, ..."""
     return type(part).__name__
-
-
-def _value_of(value: Any) -> Any:
-    """Of a Parameter its value, else what was given."""
-    return value.value if isinstance(value, Parameter) else value
 
 
 def _problems_of_ties(parts: Sequence[Any], planar: bool) -> Iterator[str]:
@@ -68,38 +63,29 @@ def _of_joint(joint: Joint, planar: bool) -> Iterator[str]:
     if not possible and planar:
         yield f"{what} is a joint in space: in the plane use Revolute, Prismatic or PointOnPlane"
         return
-    if isinstance(joint, Universal) and joint.second_axis not in tuple(AXES):
-        yield f"{what}: second_axis is {joint.second_axis!r}, expected 'x', 'y' or 'z'"
+    yield from (f"{what}: {problem}" for problem in joint.problems())
     if joint.axis and joint.axis not in tuple(possible):
         yield (
             f"{what}: axis is {joint.axis!r}, expected {' or '.join(map(repr, possible)) or 'none'} {where}"
         )
-    if joint.friction is not None and isinstance(joint, Planar):
-        yield f"{what}: friction is given, but no force across its axis could press: rub a Contact instead"
+    if joint.friction is not None and joint.smooth:
+        yield f"{what}: friction is given, but {joint.smooth}"
     elif joint.friction is not None and not joint.measures:
         rubs = "Revolute, Prismatic and Cylindrical joints, PointOnCurve and Contact"
         yield f"{what}: friction is given, but only {rubs} rub: leave it out"
-    elif joint.friction is not None and joint.turns and not _value_of(joint.radius):
+    elif joint.friction is not None and joint.turns and not value_of(joint.radius):
         yield f"{what}: friction is given without the radius of the pin, expected radius=... in m"
-    if isinstance(joint, Screw) and joint.friction is not None:
-        yield f"{what}: friction is given, but a thread has none here: brake its turn by a Torsion's damping"
-    if (
-        isinstance(joint, Screw)
-        and is_number(_value_of(joint.lead))
-        and not float(_value_of(joint.lead))
-    ):
-        yield f"{what}: lead is {joint.lead!r}, expected metres a turn, not 0 (left-handed: negative)"
     yield from _of_constant(what, joint)
     if joint.length is not None and joint.friction is None:
         yield f"{what}: the length of its bearing is given, but no friction: give friction, or leave it out"
-    elif joint.length is not None and (isinstance(joint, Planar) or (planar and joint.turns)):
+    elif joint.length is not None and planar and joint.turns:
         yield f"{what}: length is given, but its bearing takes no moment: leave it out"
     limits = joint.limits
     if limits is None:
         if not is_number(joint.restitution) or float(joint.restitution):  # type: ignore[arg-type]
             yield f"{what}: restitution is given, but no limits at which it could rebound: give limits"
         return
-    both = joint.slides and joint.turns and not isinstance(joint, Screw)
+    both = joint.slides and joint.turns and not joint.coupled
     if both or not (joint.slides or joint.turns):
         yield f"{what}: limits are given, but it has no angle or position to be limited: leave them out"
     elif isinstance(limits, str) or not isinstance(limits, Sequence) or len(limits) != 2:
@@ -116,7 +102,7 @@ def _of_constant(what: str, joint: Joint) -> Iterator[str]:
     if joint.friction is not None:
         yield f"{what}: friction and {word} are given, expected one of them"
     of = several(joint.constant)
-    numbers = [_value_of(x) for x in of]
+    numbers = [value_of(x) for x in of]
     if len(of) not in (1, 2) or any(is_number(x) and float(x) < 0 for x in numbers):
         yield f"{what}: {word} is {joint.constant!r}, expected one number of at least 0, or two"
     elif all(map(is_number, numbers)) and float(numbers[0]) < float(numbers[-1]):
@@ -141,7 +127,7 @@ def _of_curve(part: PointOnCurve, planar: bool) -> Iterator[str]:
 def _of_numbers(part: Any) -> Iterator[str]:
     """Numbers that are out of bounds, where they are numbers."""
     what = f"{_kind_of(part)} {part.name!r}"
-    radius, restitution = (_value_of(getattr(part, n, 0.0)) for n in ("radius", "restitution"))
+    radius, restitution = (value_of(getattr(part, n, 0.0)) for n in ("radius", "restitution"))
     friction = getattr(part, "friction", None)
     if is_number(radius) and float(radius) < 0:
         yield f"{what}: radius is {radius!r}, expected a number of at least 0 in m"
@@ -156,8 +142,17 @@ def _of_numbers(part: Any) -> Iterator[str]:
 
 
 def _is_zero(number: Any) -> bool:
-    value = _value_of(number)
+    value = value_of(number)
     return is_number(value) and float(value) == 0
+
+
+NO_MOTION = "none: no joint turns or slides"
+
+
+def _unfit(joint: Joint) -> str:
+    """Why it is not named as it stands by what drives one motion."""
+    both = "turns and slides: one of the two is named"
+    return both if joint.measures else "has neither an angle nor a position"
 
 
 def _of_references(part: Any, parts: Sequence[Any]) -> Iterator[str]:
@@ -181,12 +176,12 @@ def _of_references(part: Any, parts: Sequence[Any]) -> Iterator[str]:
         if joint not in known:
             yield (
                 f"{_kind_of(part)} {part.name!r}: no joint is called {joint!r}, expected one of "
-                f"{', '.join(fit) or 'none: no joint turns or slides'}"
+                f"{', '.join(fit) or NO_MOTION}"
             )
         else:
             yield (
-                f"{_kind_of(part)} {part.name!r}: {_kind_of(known[joint])} {joint!r} has no angle or "
-                f"position or both, expected one of {', '.join(fit) or 'none: no joint turns or slides'}"
+                f"{_kind_of(part)} {part.name!r}: {_kind_of(known[joint])} {joint!r} "
+                f"{_unfit(known[joint])}, expected one of {', '.join(fit) or NO_MOTION}"
             )
     if len(named) == 2 and len({*map(name_of_joint, named)}) == 1:
         yield f"Gear {part.name!r} ties {name_of_joint(named[0])!r} to itself, expected two joints"
@@ -273,7 +268,7 @@ def _of_body(body: Body, planar: bool) -> Iterator[str]:
         ]
         yield from _of_tensor(what, body.inertia)
     for of, value, unit in masses:
-        number = _value_of(value)
+        number = value_of(value)
         if is_number(number) and not float(number) >= 0:
             yield (
                 f"{what} has the {of} {number!r}, expected a positive number in {unit}, or 0 where joints to "
@@ -298,7 +293,7 @@ def _of_shape(body: Body | Ground, planar: bool) -> Iterator[str]:
 
 def _of_tensor(what: str, inertia: Sequence[Any]) -> Iterator[str]:
     """The principal moments of a rigid body satisfy the triangle inequality."""
-    values = [_value_of(x) for x in inertia]
+    values = [value_of(x) for x in inertia]
     if not all(map(is_number, values)) or min(map(float, values[:3])) < 0:
         return
     xx, yy, zz, xy, xz, yz = [*map(float, values), 0.0, 0.0, 0.0][:6]
@@ -409,7 +404,7 @@ def warn_of_radii(draft: Draft, parts: Sequence[Any]) -> None:
     for part in parts:
         if getattr(part, "friction", None) is None or not hasattr(part, "measures"):
             continue
-        radius = _value_of(part.radius)
+        radius = value_of(part.radius)
         if far > 0 and is_number(radius) and float(radius) > far:
             warnings.warn(
                 f"{_kind_of(part)} {part.name!r}: the radius of its pin is {float(radius):g} m, and no "

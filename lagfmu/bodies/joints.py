@@ -11,17 +11,17 @@ A.x, A.y, A.z, A.rx, A.ry, A.rz: named by the axes of the first marker.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 import sympy as sp
 
-from ..model.elements import Expr, Friction, Holonomic, Nonholonomic, Parameter
+from ..model.elements import Expr, Friction, Holonomic, Nonholonomic, Parameter, is_number
 from ..model.model import Model
 from ..model.reactions import multiplier, norm
-from .body import Marker, Number, several
+from .body import Marker, Number, several, value_of
 from .draft import Draft, Relative, Wrench
 from .guess import Guess, Reach
 from .motion import (
@@ -73,6 +73,12 @@ class Joint:
     possible: ClassVar[tuple[str, str]] = ("z", "xyz")
     slides: ClassVar[str] = ""  # what it leaves free: "along" its axis, "across" it
     turns: ClassVar[str] = ""  # "about" its axis, "across" it
+    coupled: ClassVar[bool] = False  # its turn and its slide are one motion, which may have limits
+    smooth: ClassVar[str] = ""  # why `friction` is refused though it moves, and what to do instead
+
+    def problems(self) -> Iterator[str]:
+        """What is wrong with the arguments that joints of its kind alone have, in words."""
+        yield from ()
 
     def add(self, draft: Draft) -> None:
         """Its rows, its coordinate with the limits, and what the second body receives."""
@@ -90,6 +96,11 @@ class Joint:
     def constant(self) -> Any:
         """The torque or force of its friction, where no normal force makes it."""
         return None
+
+    @property
+    def crossed(self) -> str:
+        """The axis of the second marker about which it turns besides."""
+        return ""
 
     def relative_pose(self, guess: Guess) -> Reach:
         """A rough place of the second marker in the first."""
@@ -295,6 +306,14 @@ class Screw(Cylindrical):
 
     lead: Number = 0.0
 
+    coupled = True
+    smooth = "a thread has none here: brake its turn by a Torsion's damping"
+
+    def problems(self) -> Iterator[str]:
+        """A lead of 0."""
+        if is_number(lead := value_of(self.lead)) and not float(lead):
+            yield f"lead is {self.lead!r}, expected metres a turn, not 0 (left-handed: negative)"
+
     def coordinate(self, draft: Draft, a: Placed, b: Placed, axis: int, wrench: Wrench) -> None:
         """Both motions, and the row of the thread."""
         super().coordinate(draft, a, b, axis, wrench)
@@ -317,6 +336,7 @@ class Planar(Joint):
     possible = ("", "xyz")
     slides = "across"
     turns = "about"
+    smooth = "no force across its axis could press: rub a Contact instead"
 
 
 @dataclass(frozen=True, eq=False)
@@ -332,6 +352,16 @@ class Universal(Joint):
     usual = ("x", "x")
     possible = ("", "xyz")
     turns = "about across"
+
+    def problems(self) -> Iterator[str]:
+        """A second axis that is none."""
+        if self.second_axis not in tuple(AXES):
+            yield f"second_axis is {self.second_axis!r}, expected 'x', 'y' or 'z'"
+
+    @property
+    def crossed(self) -> str:
+        """The second axis."""
+        return self.second_axis
 
     def rows(self, draft: Draft, a: Placed, b: Placed, axis: int, wrench: Wrench) -> None:
         """Three rows of the origins, and a1 . b2 = 0."""

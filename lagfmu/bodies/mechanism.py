@@ -15,7 +15,7 @@ from .assembly import assemble
 from .body import Body, Ground, Marker
 from .check import coinciding, problems_of, problems_of_containers, warn_of_radii
 from .draft import Draft, readings_of
-from .joints import Gear, Joint, Screw
+from .joints import Gear, Joint
 from .laws import laws_of
 from .loads import Motor, Torsion
 from .motion import AXES
@@ -137,7 +137,7 @@ def mechanism(
 def _wound(parts: Sequence[Any], start: Mapping[str, Any]) -> set[str]:
     """The angles of joints that a screw, gear, motor, torsion spring, limit or the start needs over turns."""
     joints = {p.name: p for p in parts if isinstance(p, Joint)}
-    named: list[Any] = [j for j in joints.values() if j.limits is not None or isinstance(j, Screw)]
+    named: list[Any] = [j for j in joints.values() if j.limits is not None or j.coupled]
     named += [j for p in parts if isinstance(p, Gear) for j in (p.first, p.second)]
     named += [p.joint for p in parts if isinstance(p, Motor | Torsion)]
     named += [f"angle.{n}" for j in joints.values() for n in getattr(j, "stops", ())]

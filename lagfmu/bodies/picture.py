@@ -30,7 +30,7 @@ from .body import Ground, Marker
 from .contacts import Contact
 from .curves import PointOnCurve
 from .draft import Draft
-from .joints import Distance, Gear, Joint, Rolling, Universal
+from .joints import Distance, Gear, Joint, Rolling
 from .loads import Gravity, Motor, SpringDamper, Torsion
 from .motion import AXES, Motion, Placed, Vector, dot, minus, plus, times
 from .solid import holds, solid
@@ -278,8 +278,8 @@ def _pivots(draft: Draft, joint: Joint, first: Placed, second: Placed) -> Iterat
     planar = len(draft.components) == 2
     a = AXES.index(joint.axis or joint.usual[0 if planar else 1])
     axis, other = _drawn(draft, first.axes[a].value), _drawn(draft, second.point)
-    if isinstance(joint, Universal):
-        b = AXES.index(joint.second_axis)
+    if joint.crossed:
+        b = AXES.index(joint.crossed)
         yield Pivot(other, axis)
         yield Pivot(other, _drawn(draft, second.axes[b].value))
     elif joint.slides:
