@@ -43,7 +43,7 @@ from lagfmu.prepare.steps import Prepared
 
 MODELS = Path(__file__).parent / "models"
 RUNS = 3  # the time is the median of these
-COLUMNS = """ms/s: wall time of a simulated second in ms
+COLUMNS = """ms/s: wall time of a simulated second in ms, with unpacking and loading
 worst: the error that comes nearest to what is allowed, and of which statement"""
 HEADINGS = ["fmu", "target", "bytes", "build_s", "steps", "wall_ms_per_s"]
 HEADINGS += ["statement", "error", "allowed", "points", "verdict"]
