@@ -371,3 +371,16 @@ def test_what_files_of_the_runtime_share_is_declared_so() -> None:
         bare = TOKENS.sub("", path.read_text(encoding="utf-8"))
         assert plain.findall(bare) == [], path.name
         assert "extern" not in bare or path.name in ("fmi2.h", "fmi3.h", "linkage.h"), path.name
+
+
+def test_the_map_names_files_that_exist() -> None:
+    """Where a change belongs is said by paths below lagfmu/, or by a file's name."""
+    told = (ROOT.parent / "CONTRIBUTING.md").read_text("utf-8")
+    places = re.findall(r"`([\w/*]+(?:/|\.(?:py|c|h|css|js)))`", told)
+    lost = [
+        p
+        for p in places
+        if "NAME" not in p and not (any(ROOT.parent.glob(p)) or any(ROOT.rglob(p)))
+    ]
+    assert len(places) > 60
+    assert not lost
