@@ -80,6 +80,16 @@ def test_a_damaged_member_is_one_message(native_fmu, tmp_path, command):
         assert done.exception is None or isinstance(done.exception, SystemExit)
 
 
+def test_an_unpacked_folder_is_told_apart_from_a_missing_file(native_fmu, tmp_path):
+    """A page is made of the archive."""
+    with zipfile.ZipFile(native_fmu("Hemisphere")) as archive:
+        archive.extractall(tmp_path / "unpacked")
+    for words in (["page"], ["linearize", "--page", str(tmp_path / "x.html")]):
+        done = CliRunner().invoke(app, [*words, str(tmp_path / "unpacked")])
+        assert done.exit_code != 0
+        assert "this is a folder, expected the archive" in " ".join(done.output.split())
+
+
 @pytest.mark.thorough
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGTERM there")
 @pytest.mark.parametrize(

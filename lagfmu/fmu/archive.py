@@ -69,7 +69,8 @@ def opened(fmu: Path) -> Iterator[zipfile.ZipFile]:
     damaged while it is read.
     """
     if not fmu.is_file():
-        raise VerificationError(f"{str(fmu)!r}: there is no such file")
+        what = "this is a folder, expected the archive" if fmu.is_dir() else "there is no such file"
+        raise VerificationError(f"{str(fmu)!r}: {what}")
     try:
         with zipfile.ZipFile(fmu) as archive:
             if any(i.compress_size > fmu.stat().st_size for i in archive.infolist()):
