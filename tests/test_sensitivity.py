@@ -120,7 +120,8 @@ def test_beside_other_events_there_is_no_difference(native_fmu):
     found = sensitivity(native_fmu("Hemisphere"), [LEAVES], stop_time=3.0)
     assert np.isnan(found.derivatives[0, list(found.points).index("r")])
     assert found.why[LEAVES, "r"] == "runs beside this one meet other events"
-    assert "runs beside this one meet other events" in repr(found)
+    told = f"{LEAVES}: no derivative by r, der(r): runs beside this one meet other events"
+    assert told in found.remarks()
 
 
 def test_where_there_is_no_derivative_nobody_takes_its_zero(built, tmp_path):

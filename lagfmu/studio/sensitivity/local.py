@@ -221,9 +221,11 @@ class Sensitivity:
             for k, name in enumerate(self.points):
                 if k in hidden and (output, name) in self.why:
                     untold.setdefault(self.why[output, name], []).append(name)
-            notes += [f"no derivative by {', '.join(by)}: {why}" for why, by in untold.items()]
+            notes += [
+                f"{output}: no derivative by {', '.join(by)}: {why}" for why, by in untold.items()
+            ]
             if rest := len(hidden) - sum(map(len, untold.values())):
-                text = f"{output}: {rest} more matter less than {MATTERS:g} of the first"
+                text = f"{output}: not shown: {rest} below {MATTERS:g} of the first"
                 notes.append(f"{text}: --to NAME shows them")
         return notes + self._differences()
 
