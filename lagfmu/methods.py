@@ -15,14 +15,16 @@ class Method:
     """One entry of the menu.
 
     `made_of` are the integrators behind it where it is not one itself, the explicit one first; `remark`:
-    what the description of `solver.method` says of it; `differentiated`: a run by it has derivatives;
-    `tangents`: it needs the equations' own; `separable`: it steps equations of position constraints alone,
-    with a constant mass matrix and forces without velocities; `colour`, `marker`: in a figure.
+    what the description of `solver.method` says of it; `use`: what it is for, as docs/accuracy.md says it;
+    `differentiated`: a run by it has derivatives; `tangents`: it needs the equations' own; `separable`: it
+    steps equations of position constraints alone, with a constant mass matrix and forces without velocities;
+    `colour`, `marker`: in a figure.
     """
 
     name: str
     number: int
     remark: str = ""
+    use: str = ""
     fixed_step: bool = False
     native_only: bool = False
     made_of: tuple[str, ...] = ()
@@ -35,10 +37,20 @@ class Method:
 
 
 MENU = (
-    Method("auto", 1, "dop853, but radau5 where it is stiff", made_of=("dop853", "radau5")),
-    Method("dop853", 2, explicit=True, differentiated=True, colour="#0b6e99", marker="o"),
     Method(
-        *("rk4", 3, "fixed step"),
+        *("auto", 1, "dop853, but radau5 where it is stiff"),
+        "`dop853`, and `radau5` while stiffness holds it back; the log says when. Python target: `dop853`",
+        made_of=("dop853", "radau5"),
+    ),
+    Method(
+        *("dop853", 2, "", "almost everything"),
+        explicit=True,
+        differentiated=True,
+        colour="#0b6e99",
+        marker="o",
+    ),
+    Method(
+        *("rk4", 3, "fixed step", "a constant cost for each step, without error control"),
         fixed_step=True,
         native_only=True,
         explicit=True,
@@ -47,10 +59,16 @@ MENU = (
         marker="D",
     ),
     Method(
-        *("radau5", 4, "stiff"), differentiated=True, tangents=True, colour="#6940a5", marker="^"
+        *("radau5", 4, "stiff", "stiff springs and dampers"),
+        differentiated=True,
+        tangents=True,
+        colour="#6940a5",
+        marker="^",
     ),
     Method(
         *("rattle", 5, "fixed step"),
+        "long horizons: no drift of the energy. Fixed steps, symmetric, order 6; constant M and forces of "
+        "the position only",
         fixed_step=True,
         native_only=True,
         separable=True,

@@ -835,7 +835,7 @@ pin = Revolute("A", ground.at((0, 0)), arm.at((0, 0)))
         ),
         (
             {"contacts": [Contact("K", ground.at((0, 0)), arm.at((0, 0)), restitution=2)]},
-            "Contact 'K': restitution is 2, expected a number from 0 to 1",
+            "Contact 'K': restitution is 2, expected 0 (no rebound) to 1 (no loss)",
         ),
         (
             {"joints": [Distance("L", ground.at((0, 0)), arm.at((0, 0)), -1)]},

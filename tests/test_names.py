@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -9,6 +10,7 @@ from sympy import symbols
 from sympy.physics.mechanics import dynamicsymbols
 
 from lagfmu import Contact, Holonomic, Model, Output, Parameter, Scene, multiplier, names, simulate
+from lagfmu.methods import AUTO, MENU
 from lagfmu.names import Subject
 
 DOCS = Path(__file__).parent.parent / "docs"
@@ -130,3 +132,13 @@ def test_what_an_fmu_reports_stands_in_the_documentation(kind: names.Kind) -> No
     head, _, tail = names.name(kind.quantity, one).partition(".*")
     assert f"`{head}" in pages
     assert not tail or f"`{tail}`" in pages
+
+
+def test_the_page_says_of_each_method_what_its_row_says() -> None:
+    """Name, number, where it can be had, and what it is for."""
+    page = Path(__file__).parent.parent.joinpath("docs", "accuracy.md").read_text(encoding="utf-8")
+    told = [line for line in page.splitlines() if re.match(r"\| `\w+` \(\d", line)]
+    assert told == [
+        f"| `{m.name}` ({m.number}{', default' * (m.name == AUTO)}{', native' * m.native_only}) | {m.use} |"
+        for m in MENU
+    ]

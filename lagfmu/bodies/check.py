@@ -20,6 +20,7 @@ from ..model.model import Model
 from ..model.picture import Box, Track, points_of
 from ..model.spline import Spline
 from ..names import RESERVED
+from ..numeric.contacts import REBOUND, is_restitution
 from .body import Body, Ground, Marker, problem_of, several, value_of
 from .contacts import Contact
 from .curves import PointOnCurve
@@ -131,8 +132,8 @@ def _of_numbers(part: Any) -> Iterator[str]:
     friction = getattr(part, "friction", None)
     if is_number(radius) and float(radius) < 0:
         yield f"{what}: radius is {radius!r}, expected a number of at least 0 in m"
-    if is_number(restitution) and not 0 <= float(restitution) <= 1:
-        yield f"{what}: restitution is {restitution!r}, expected a number from 0 to 1"
+    if is_number(restitution) and not is_restitution(float(restitution)):
+        yield f"{what}: restitution is {restitution!r}, {REBOUND}"
     if isinstance(friction, tuple | list) and len(friction) != 2:
         yield f"{what}: friction is {friction!r}, expected one coefficient, or the static and the kinetic"
     if isinstance(part, Gear) and _is_zero(part.ratio) and all(map(_is_zero, part.higher)):

@@ -20,6 +20,13 @@ from .motion import motion
 from .system import System, Vector
 from .thresholds import CONTACT_PULL, CONTACTS_MOST
 
+REBOUND = "expected 0 (no rebound) to 1 (no loss)"
+
+
+def is_restitution(e: float) -> bool:
+    """Newton's coefficient of no landing gains energy."""
+    return 0 <= e <= 1
+
 
 def restitution(system: System, p: Sequence[float]) -> Vector:
     """e of each row (m), 0 where it is no contact.  Raises StepFailureError naming those that are none."""
@@ -27,10 +34,9 @@ def restitution(system: System, p: Sequence[float]) -> Vector:
         return np.zeros(system.m)
     e = np.array(system.restitution(p), dtype=float)
     wrong = [
-        f"the coefficient of restitution of {system.rows[k].name!r} is {float(e[k])!r}, expected 0 (no "
-        "rebound) to 1 (no loss)"
+        f"the coefficient of restitution of {system.rows[k].name!r} is {float(e[k])!r}, {REBOUND}"
         for k in system.contacts
-        if not 0 <= e[k] <= 1
+        if not is_restitution(e[k])
     ]
     if wrong:
         raise StepFailureError("; ".join(wrong))
