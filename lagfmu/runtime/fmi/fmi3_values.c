@@ -58,7 +58,7 @@ FMI3_ACCESS(Int64, &INT64)
 FMI3_ACCESS(Boolean, &BOOL)
 
 /* Of the other types there are no variables. */
-#define FMI3_NO_ACCESS(Type) FMI3_ACCESS(Type, (&(const Group){#Type, 0, 0, AS_DOUBLE}))
+#define FMI3_NO_ACCESS(Type) FMI3_ACCESS(Type, (&(const Group){#Type, 0, AS_DOUBLE}))
 FMI3_NO_ACCESS(Float32)
 FMI3_NO_ACCESS(Int8)
 FMI3_NO_ACCESS(UInt8)
