@@ -135,13 +135,13 @@ def test_the_closed_form_of_the_multipliers_is_exact(n):
 
 def test_the_angle_of_a_hinge_is_a_matter_of_its_two_bodies():
     """Its rate holds the upper one's about the axis, and the lower one's three, the ground none: those of all
-    angles are known by as many evaluations in a chain of 12 as in one of 6."""
+    angles are known by as many evaluations in a chain of 8 as in one of 4."""
     counts = []
-    for n in (6, 12):
+    for n in (4, 8):
         text = sources_of(prepare(hinged(n, "xy"))).generated["model.c"].decode()
         names = ("joint_count", "joint_rates", "joint_groups")
         counts.append([int(re.findall(rf"\.{name} = (\d+)", text)[0]) for name in names])
-    assert [(count, rates) for count, rates, _ in counts] == [(6, 3 + 4 * 5), (12, 3 + 4 * 11)]
+    assert [(count, rates) for count, rates, _ in counts] == [(4, 3 + 4 * 3), (8, 3 + 4 * 7)]
     assert counts[0][2] == counts[1][2] <= 6
 
 

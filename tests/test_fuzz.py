@@ -34,7 +34,7 @@ import lagfmu
 from lagfmu.errors import LagfmuError
 
 MODELS = Path(__file__).parent.parent / "models"
-SHORT, LONG = 60, 1000  # edits a reader
+SHORT, LONG = 30, 1000  # edits a reader
 SECONDS = 5  # of the processor, for one edit
 MEMORY = 500 * 2**20  # bytes, beside what the program itself has
 LONGEST = 21_000  # letters of a message
@@ -667,7 +667,7 @@ def files(native_fmu, fmi3_fmu, shared_folder) -> Path:
 
 
 def test_edited_files_are_read_or_refused(files, tmp_path):
-    """Of 60 seeded edits of each kind of file, and 10 of those that are run, each is read, or refused with
+    """Of 30 seeded edits of each kind of file, and 5 of those that are run, each is read, or refused with
     the remedy."""
     readers = [r for r in READERS if r != "mjcf" or importlib.util.find_spec("mujoco")]
     assert run(readers, SHORT, files, tmp_path) == []

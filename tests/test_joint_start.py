@@ -375,14 +375,20 @@ def hinges(kind: Any, start: dict[str, float], *, plane: bool = True, motor: Any
     return mechanism("Open", bodies=bodies, joints=joints, loads=loads, start=start, **space)
 
 
-@pytest.mark.parametrize("given", [0.1, None])
+OPEN = (
+    (Revolute, ("angle",), True),
+    (Revolute, ("angle",), False),
+    (Prismatic, ("position",), True),
+    (Cylindrical, ("angle", "position"), False),
+)
+
+
 @pytest.mark.parametrize(
-    ("kind", "measures", "plane"),
+    ("kind", "measures", "plane", "given"),
     [
-        (Revolute, ("angle",), True),
-        (Revolute, ("angle",), False),
-        (Prismatic, ("position",), True),
-        (Cylindrical, ("angle", "position"), False),
+        pytest.param(*case, given, marks=() if k % 2 == (given is None) else pytest.mark.thorough)
+        for k, case in enumerate(OPEN)
+        for given in (0.1, None)
     ],
 )
 def test_setting_one_joint_of_an_open_chain_moves_no_other(
