@@ -1,6 +1,6 @@
 """The names of testing.py, and where they are."""
 
-from .bodies.solid import solid
+from .bodies.picture import solid
 from .cli import studies as stress_command
 from .cli.app import COMMANDS, app
 from .cli.progress import told
@@ -74,10 +74,9 @@ from .model.units import (
     parse_unit,
 )
 from .numeric import thresholds
-from .numeric.failure import StepFailureError
+from .numeric.failure import GIVEN, OMITTED, StepFailureError
 from .numeric.initialization import Stage
 from .numeric.linear import solve as solve_at_start
-from .numeric.start_priority import GIVEN, OMITTED
 from .numeric.system import System
 from .page.documentation import page as documentation_page
 from .page.documentation import with_figures

@@ -6,8 +6,7 @@ Never knows: the solver and FMI.
 """
 
 from .body import Body, Ground
-from .contacts import Contact
-from .curves import PointOnCurve
+from .contacts import Contact, PointOnCurve
 from .joints import (
     Cylindrical,
     Distance,

@@ -70,7 +70,7 @@ class Body(_Carrier):
     The inertia is one number in the plane; in space xx, yy, zz, or these and xy, xz, yz: elements of the
     tensor, so that a product of inertia has URDF's sign.  A body whose mass or inertia is 0 moves as its
     joints to others say.  `shape` is how it looks, in its own frame: a lagfmu.Box, Rod, Sphere, Disk or Line,
-    or several; without it bodies/solid.py chooses in space.
+    or several; without it bodies/picture.py chooses in space.
     """
 
     name: str

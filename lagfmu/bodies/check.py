@@ -22,8 +22,7 @@ from ..model.spline import Spline
 from ..names import RESERVED
 from ..numeric.contacts import REBOUND, is_restitution
 from .body import Body, Ground, Marker, problem_of, several, value_of
-from .contacts import Contact
-from .curves import PointOnCurve
+from .contacts import Contact, PointOnCurve
 from .draft import Draft, Reading
 from .joints import Distance, Gear, Joint, Rolling, name_of_joint
 from .loads import Force, Gravity, Motor, Rotor, SpringDamper, Torque, Torsion

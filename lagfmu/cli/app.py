@@ -8,10 +8,9 @@ import typer
 
 from ..fmu.archive import tool
 from ..verification.pipeline import EXIT_CODES
-from .commands.linearize import linearize
 from .commands.models import build, new, page, show
 from .commands.runs import reference, report, simulate, verify
-from .commands.studies import fit, sensitivity, stress, sweep, tradeoff
+from .commands.studies import fit, linearize, sensitivity, stress, sweep, tradeoff
 from .terminal import prepare_streams
 
 COMMANDS = (

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from ..errors import SimulationError
 from ..model.rule import missing
-from ..numeric.start_priority import MISSES
+from ..numeric.failure import MISSES
 from .archive import unpack
 from .binary import BATCH, instantiated, is_ours, listen
 from .read import Trajectory, described_rules, experiment_of, obstacle, read_description

@@ -24,11 +24,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from .failure import OmittedStartError, StartFailureError, StepFailureError
+from .failure import GIVEN, OMITTED, SET, OmittedStartError, StartFailureError, StepFailureError
 from .instant import Instant
 from .linear import solve
 from .nominals import extents, in_speeds, motion_speeds
-from .start_priority import GIVEN, OMITTED, SET
 from .system import NONHOLONOMIC, Sparse, System, Vector
 from .thresholds import (
     INITIAL_ARRIVED,

@@ -14,13 +14,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .contacts import closed_contacts, restitution, stays_low
-from .failure import StartFailureError, StepFailureError
+from .failure import GIVEN, Moved, StartFailureError, StepFailureError
 from .initialization import EPS, initial_positions, initial_velocities
 from .instant import Instant, at_start
 from .linear import independent
 from .motion import NONE, motion, stick_slip
 from .nominals import in_speeds, motion_speeds, natural, sizes
-from .start_priority import GIVEN, Moved
 from .system import Sparse, System, Vector
 from .thresholds import LARGEST_ANGLE, LOST, MOVED, ROUNDINGS, TOUCH
 

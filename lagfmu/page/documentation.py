@@ -29,7 +29,7 @@ from ..mechanics.formulations import Form
 from ..mechanics.integrability.classify import Classification
 from ..model.model import Contact, Holonomic, Model, Nonholonomic
 from ..model.units import Unit, for_reading
-from ..numeric.start_priority import OMITTED
+from ..numeric.failure import OMITTED
 from ..prepare.steps import Prepared
 from .savings import savings
 from .typeset import typeset

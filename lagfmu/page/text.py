@@ -17,7 +17,7 @@ from ..mechanics.integrability.classify import Classification, classify
 from ..model.elements import TIME
 from ..model.model import Contact, Nonholonomic, name_of
 from ..names import FORCE, MULTIPLIER, OWN
-from ..numeric.start_priority import OMITTED
+from ..numeric.failure import OMITTED
 from ..prepare.consistency import of_undecided, remedy_of
 from ..prepare.steps import Lowered, Prepared
 from .documentation import as_given, shown

@@ -27,13 +27,12 @@ from ..mechanics.formulations import Form
 from ..model.model import Contact, name_of
 from ..model.units import ONE, for_reading
 from ..names import RESIDUAL, name
-from ..numeric.failure import OmittedStartError, StepFailureError
+from ..numeric.failure import GIVEN, OmittedStartError, StepFailureError
 from ..numeric.initialization import initial_positions
 from ..numeric.instant import at_start, expanded
 from ..numeric.motion import MISSED, friction_law, rank_of
 from ..numeric.nominals import Mask, in_speeds
 from ..numeric.start import Start, start
-from ..numeric.start_priority import GIVEN
 from ..numeric.system import NONHOLONOMIC, Sparse, System, Vector
 from ..numeric.thresholds import RANK
 from .starts import cause_of_failure, negative_energy, priorities

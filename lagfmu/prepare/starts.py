@@ -16,11 +16,10 @@ import numpy as np
 
 from ..errors import ModelError
 from ..interface.variables import VariableTable
-from ..numeric.failure import StepFailureError
+from ..numeric.failure import GIVEN, LEFT_OUT, OMITTED, Moved, StepFailureError, left_out
 from ..numeric.initialization import initial_positions
 from ..numeric.instant import Instant
 from ..numeric.linear import blocks, massless
-from ..numeric.start_priority import GIVEN, LEFT_OUT, OMITTED, Moved, left_out
 from ..numeric.system import Matrix, Sparse, System, Vector
 from ..numeric.thresholds import RANK
 
@@ -33,7 +32,7 @@ class StartMovedWarning(UserWarning):
 
 
 def priorities(system: System, table: VariableTable) -> list[int]:
-    """Of each coordinate (nq) and then each speed (nv): who said its start value, as in start_priority.py."""
+    """Of each coordinate (nq) and then each speed (nv): who said its start value, as in numeric/failure.py."""
     return [GIVEN if table[name].given else OMITTED for name in system.states]
 
 

@@ -39,7 +39,7 @@ from ..model.model import Model
 from ..model.rule import missing
 from ..model.scene import Scene
 from ..model.units import for_reading
-from ..numeric.start_priority import LEFT_OUT, MISSES
+from ..numeric.failure import LEFT_OUT, MISSES
 from ..numeric.thresholds import tolerance_problem
 from ..prepare.prepare import prepare
 from ..prepare.starts import check_given, tell

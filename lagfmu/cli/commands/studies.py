@@ -1,4 +1,6 @@
-"""Commands that run an FMU many times: at extremes, in other settings, over a design, until it fits."""
+"""Commands that ask more of an FMU than one run: at extremes, in other settings, over a design, until it fits;
+or what is linear beside a state.
+"""
 
 from __future__ import annotations
 
@@ -389,3 +391,67 @@ def _range(text: str) -> tuple[str, tuple[float, float]]:
     if not sign or not math.isfinite(low + high):
         raise UsageError(f"--over {text!r}: expected NAME=LOW:HIGH, finite numbers in SI")
     return name, (low, high)
+
+
+def linearize(
+    target: Runnable,
+    at: Annotated[
+        float | None,
+        typer.Option(metavar="T", help="Beside the motion at this time in s (default: the start)."),
+    ] = None,
+    equilibrium: Annotated[
+        bool,
+        typer.Option(
+            "--equilibrium", help="Beside the equilibrium that is found from the start, at rest."
+        ),
+    ] = False,
+    inputs: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME,...", help="Inputs u (default: all); '' for none."),
+    ] = None,
+    outputs: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME,...",
+            help="Outputs y (default: multipliers, forces of constraint, outputs of the model's own).",
+        ),
+    ] = None,
+    set_: Settings = None,
+    scene: SceneName = None,
+    output: Annotated[
+        list[Path] | None,
+        typer.Option(help="Write A, B, C, D and all else: .json or .mat; repeatable."),
+    ] = None,
+    page: Annotated[
+        Path | None, typer.Option(help="Write an HTML file on which the modes move.")
+    ] = None,
+) -> None:
+    """A, B, C, D, poles and modes in coordinates that the constraints leave free."""
+    from ...fmu.read import read_description, units_of
+    from ...model.scene import listed
+    from ...page.table import print_whole
+    from ...studio.linearize.linearize import linearize as found_by
+    from ...studio.linearize.linearize import made_for
+
+    def names(given: list[str] | None) -> list[str] | None:
+        return None if given is None else [n for text in given for n in listed(text)]
+
+    with plainly(), made_for(target, scene) as fmu:
+        found = found_by(
+            fmu,
+            at=at,
+            equilibrium=equilibrium,
+            inputs=names(inputs),
+            outputs=names(outputs),
+            start_values=assignments(set_, lambda: units_of(read_description(fmu).modelVariables)),
+            page=page,
+        )
+        say(found.summary())
+        for table in found.tables():
+            print_whole(console, table)
+        for text in found.remarks():
+            say(text, "note:", "yellow")
+        for path in output or ():
+            say_wrote(found.save(path))
+        if page is not None:
+            say_wrote(page)

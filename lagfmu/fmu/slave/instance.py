@@ -15,9 +15,8 @@ import numpy as np
 
 from ... import names
 from ...model.rule import MESSAGES
-from ...numeric.failure import StepFailureError
+from ...numeric.failure import GIVEN, OMITTED, SET, StepFailureError, left_out
 from ...numeric.start import start
-from ...numeric.start_priority import GIVEN, OMITTED, SET, left_out
 from ...numeric.system import System
 from ...numeric.thresholds import SMALLEST_TOLERANCE, tolerance_problem
 from ...solver.advance import advance, looked_at

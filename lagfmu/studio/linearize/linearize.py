@@ -26,13 +26,11 @@ from ...model.scene import EVERYTHING, Scene, select
 from ...prepare.prepare import prepare
 from ..live.page import render
 from ..live.play import told_by
-from .chart import Chart, Rows, acting, chart
-from .checks import check_contacts, check_sliding
+from .chart import Chart, Rows, acting, chart, check_contacts, check_sliding
 from .equilibrium import find
 from .exchange import Exchange
 from .modes import modes
-from .poles import ZERO, poles
-from .result import Linearization
+from .result import ZERO, Linearization, poles
 
 ROUNDING = 1e-14  # part of the largest rate, that is none in A
 DEPENDENT = 1e-9  # likewise where rows depend on each other, whose accelerations the FMU takes differences of

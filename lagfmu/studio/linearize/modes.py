@@ -24,8 +24,7 @@ from ..live.shapes import Moving
 from .chart import Chart, Rows
 from .equilibrium import place
 from .exchange import Exchange, Floats
-from .poles import Complex
-from .result import HEAD, Linearization
+from .result import HEAD, Complex, Linearization
 
 FRAMES, FEW = 96, 8  # of a mode that is shown, and to find how far it goes
 TIMES = 4  # of a real pole, that are shown
