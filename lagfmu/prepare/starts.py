@@ -32,7 +32,7 @@ class StartMovedWarning(UserWarning):
 
 
 def priorities(system: System, table: VariableTable) -> list[int]:
-    """Of each coordinate (nq) and then each speed (nv): who said its start value, as in numeric/failure.py."""
+    """Of each coordinate (nq) and then each speed (nv): who said its start value (numeric/failure.py)."""
     return [GIVEN if table[name].given else OMITTED for name in system.states]
 
 

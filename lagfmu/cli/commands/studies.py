@@ -1,5 +1,5 @@
-"""Commands that ask more of an FMU than one run: at extremes, in other settings, over a design, until it fits;
-or what is linear beside a state.
+"""Commands that ask more of an FMU than one run: at extremes, in other settings, over a design, until it
+fits; or what is linear beside a state.
 """
 
 from __future__ import annotations
