@@ -399,11 +399,15 @@ def main() -> None:
             worst = [max(worst[0], a), max(worst[1], f)]
             line = f"{shown}: taken, {n} joints, {a:.1e} {f:.1e}"
             if given.build and counts[package]["taken"] % given.build == 1 % given.build:
-                with tempfile.TemporaryDirectory() as folder:
-                    spent, size = built(path, Path(folder))
-                seconds.append(spent)
-                sizes.append(size)
-                line += f", {spent:.1f} s, {size / 1e3:.0f} kB"
+                try:
+                    with tempfile.TemporaryDirectory() as folder:
+                        spent, size = built(path, Path(folder))
+                except LagfmuError as error:
+                    line += f", not built: {cause(error)}"
+                else:
+                    seconds.append(spent)
+                    sizes.append(size)
+                    line += f", {spent:.1f} s, {size / 1e3:.0f} kB"
             print(line, flush=True)
     for package, of in counts.items():
         print(f"{package}: {', '.join(f'{of[w]} {w}' for w in ('taken', 'refused', 'broken'))}")

@@ -250,18 +250,6 @@ MJCF: dict[str, tuple[str, str]] = {
         '<mujoco><actuator><motor joint="a"/></actuator></mujoco>',
         "unknown transmission target 'a'",
     ),
-    "points apart": (
-        good("<geom", '<joint axis="1 0 0" pos="0 0.1 0"/><joint axis="0 1 0"/><geom'),
-        "their points are 0.1 m apart: give each a body of its own with a mass",
-    ),
-    "axes askew": (
-        good("<geom", '<joint axis="0 1 1"/><geom'),
-        "axes are not square to each other: give each a body of its own",
-    ),
-    "hinge before slide": (
-        good("<geom", '<joint type="slide"/><geom'),
-        "expected slides first, then hinges: give each a body of its own",
-    ),
 }
 
 

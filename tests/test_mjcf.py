@@ -122,6 +122,28 @@ JOINTS = {
         "0.4 0.9 -0.6",
         "1.1 -2 3",
     ),
+    "three hinges, points apart": (
+        '<joint name="j" axis="1 0 0" damping="1" ref="20"/><joint name="k" axis="0 1 0" pos="0 0.1 0.2"/>'
+        '<joint name="l" axis="0 0 1" pos="0.1 0 0" armature="0.2"/>',
+        "0.4 0.9 -0.6",
+        "1.1 -2 3",
+    ),
+    "two hinges, axes askew": (
+        '<joint name="j" axis="1 0 0" armature="0.1"/><joint name="k" axis="1 1 0" damping="1"/>',
+        "0.4 0.9",
+        "1.1 -2",
+    ),
+    "a hinge, then a slide": (
+        '<joint name="j" axis="0 0 1" stiffness="2"/><joint name="k" type="slide" axis="1 1 1" ref="0.3"/>',
+        "0.4 0.9",
+        "1.1 -2",
+    ),
+}
+CHAINS = {
+    "three slides",
+    "three hinges, points apart",
+    "two hinges, axes askew",
+    "a hinge, then a slide",
 }
 
 
@@ -137,7 +159,7 @@ def test_each_kind_of_joint_moves_as_in_the_format_s_own_engine(name: str, tmp_p
     path = written(tmp_path, world, servo + key)
     parts = from_mjcf(path, key="home")
     found, _ = accelerations(mechanism(parts.name, **parts.arguments))
-    if name != "three slides":
+    if name not in CHAINS:
         assert {b.name for b in parts.bodies} == {"a", "b"}
     m = mujoco.MjModel.from_xml_path(str(path))
     d = mujoco.MjData(m)
@@ -277,3 +299,11 @@ def test_an_unknown_key_and_a_missing_file_are_told(tmp_path: Path) -> None:
         from_mjcf(written(tmp_path, GOOD), key="up")
     with pytest.raises(ModelError, match="cannot be read"):
         from_mjcf(tmp_path / "none.xml")
+
+
+def test_each_of_several_joints_of_one_body_has_its_friction(tmp_path: Path) -> None:
+    """Two hinges with losses of 0.5 and 2 N m: a body without mass between them carries both."""
+    hinges = '<joint name="j" frictionloss="0.5"/><joint name="k" axis="1 0 0" frictionloss="2"/>'
+    parts = from_mjcf(written(tmp_path, f'<body name="a">{hinges}{BALL}</body>'))
+    assert {j.name: j.friction_torque for j in parts.joints} == {"j": 0.5, "k": 2.0}
+    assert [b.name for b in parts.bodies] == ["a", "j_body"]

@@ -139,6 +139,7 @@ class _Reader:
         names = {b: self._name("body", b) for b in self._movers()}
         self.joint_names = [self._name("joint", j) for j in range(m.njnt)]
         self.bodies = {b: self._body(b, name) for b, name in names.items()}
+        self.between: list[Body] = []  # without mass, between joints of one body
         self.inputs: list[Input] = []
         self.parameters: list[Parameter] = []
 
@@ -155,7 +156,8 @@ class _Reader:
         if self.problems:
             raise ModelError(self.called, self.problems)
         self._tell()
-        parts = tuple(self.bodies.values()), tuple(joints), tuple(loads)
+        bodies = (*self.bodies.values(), *self.between)
+        parts = bodies, tuple(joints), tuple(loads)
         more = tuple(self.inputs), tuple(self.parameters)
         start, tied = self._start(), self._tied()
         near = {n: start.pop(n) for n in [*start] if n in tied}
@@ -248,12 +250,13 @@ class _Reader:
         root = self.roots[b]
         return (self.bodies[root] if root else self.ground, *self._frame(root))
 
-    def _marker(self, b: int, axes: Array, point: Array) -> Marker:
-        """A frame that is given at the configuration of the file, on what a body is part of."""
+    def _marker(self, b: int, axes: Array, point: Array, on: Body | None = None) -> Marker:
+        """A frame that is given at the configuration of the file, on what a body is part of, or `on` another
+        in its place."""
         carrier, R, origin = self._carrier(b)
         own = R.T @ axes
         rotation = None if np.array_equal(own, np.eye(3)) else _square(own).tolist()
-        return carrier.at(tuple((R.T @ (point - origin)).tolist()), rotation=rotation)
+        return (on or carrier).at(tuple((R.T @ (point - origin)).tolist()), rotation=rotation)
 
     def _within(self, b: int, point: Any, quat: Any = None) -> Marker:
         """A frame that is given in the frame of a body of the file."""
@@ -282,22 +285,46 @@ class _Reader:
             self.left["limits of ball joints"] += self._has_limits(j)
             yield Spherical(self.joint_names[j], *ends)
         elif kinds in ([HINGE], [SLIDE]):
-            axis = self.data.xaxis[j]
-            R = self._frame(b)[0]
-            axes = R @ onto(np.array([0.0, 0.0, 1.0]), R.T @ axis)
-            ref, point = float(m.qpos0[m.jnt_qposadr[j]]), self.data.xanchor[j]
-            first = point - ref * axis if kinds == [SLIDE] else point
-            turned = axes @ turn(2, ref) if kinds == [HINGE] else axes
-            ends = self._marker(parent, axes, first), self._marker(b, turned, point)
-            kind = Revolute if kinds == [HINGE] else Prismatic
-            rubs: dict[str, Any] = {}
-            if loss := float(m.dof_frictionloss[m.jnt_dofadr[j]]):
-                rubs["friction_torque" if kinds == [HINGE] else "friction_force"] = loss
-            yield kind(self.joint_names[j], ends[0], ends[1], "z", self._limits(j), **rubs)
+            yield self._axle(j, parent, b)
+        elif (series := self._series(b, parent, list(own), kinds)) is not None:
+            yield series
         else:
-            yield from self._series(b, parent, list(own), kinds)
+            yield from self._chain(b, parent, list(own))
 
-    def _series(self, b: int, parent: int, own: list[int], kinds: list[int]) -> Iterator[Joint]:
+    def _axle(
+        self, j: int, parent: int, b: int, before: Body | None = None, after: Body | None = None
+    ) -> Joint:
+        """A hinge or a slide; `before`, `after`: what is in the place of b on either side of it."""
+        m, axis, R = self.m, self.data.xaxis[j], self._frame(b)[0]
+        hinge = int(m.jnt_type[j]) == HINGE
+        axes = R @ onto(np.array([0.0, 0.0, 1.0]), R.T @ axis)
+        ref, point = float(m.qpos0[m.jnt_qposadr[j]]), self.data.xanchor[j]
+        first = point if hinge else point - ref * axis
+        turned = axes @ turn(2, ref) if hinge else axes
+        ends = (
+            self._marker(b if before else parent, axes, first, before),
+            self._marker(b, turned, point, after),
+        )
+        rubs: dict[str, Any] = {}
+        if loss := float(m.dof_frictionloss[m.jnt_dofadr[j]]):
+            rubs["friction_torque" if hinge else "friction_force"] = loss
+        kind = Revolute if hinge else Prismatic
+        return kind(self.joint_names[j], *ends, "z", self._limits(j), **rubs)
+
+    def _chain(self, b: int, parent: int, own: list[int]) -> Iterator[Joint]:
+        """Joints of one body that are no Series, with bodies without mass between them."""
+        before = None
+        for j in own:
+            after = None
+            if j != own[-1]:
+                name = self._added(f"{self.joint_names[j]}_body")
+                after = Body(name, 0.0, (0.0, 0.0, 0.0))
+                self.between.append(after)
+            yield self._axle(j, parent, b, before, after)
+            before = after
+
+    def _series(self, b: int, parent: int, own: list[int], kinds: list[int]) -> Series | None:
+        """None where slides are not first, axes not square, points apart, or where they rub."""
         m, x = self.m, self.data.xaxis
         slides = [j for j, kind in zip(own, kinds, strict=True) if kind == SLIDE]
         hinges = [j for j, kind in zip(own, kinds, strict=True) if kind == HINGE]
@@ -305,31 +332,25 @@ class _Reader:
         points = np.array([self.data.xanchor[j] for j in hinges or own[-1:]])
         apart = float(np.ptp(points, axis=0).max())
         refs = [float(m.qpos0[m.jnt_qposadr[j]]) for j in own]
-        what = f"the joints {', '.join(repr(self._own('joint', j)) for j in own)} of one body"
-        remedy = "give each a body of its own with a mass"
-        if own != slides + hinges:
-            self.problems.append(f"{what}: expected slides first, then hinges: {remedy}")
-        elif len(hinges) != 2 and apart > SQUARE * max(1.0, float(np.abs(points).max())):
-            self.problems.append(f"{what}: their points are {apart:.6g} m apart: {remedy}")
-        elif axes is None:
-            self.problems.append(f"{what}: their axes are not square to each other: {remedy}")
-        elif len(hinges) > 1 and any(refs[len(slides) :]):
-            self.problems.append(f"{what}: two hinges with ref=: leave it out")
-        else:
-            letters, frame = axes
-            along, about = (letters[: len(slides)], letters[len(slides) :])
-            first, second, arm = self._met(hinges, points)
-            turned = frame
-            for j, ref in zip(own, refs, strict=True):
-                first -= ref * x[j] if j in slides else 0.0
-                turned = turned @ turn(AXES.index(about), ref) if j in hinges and ref else turned
-            ends = self._marker(parent, frame, first), self._marker(b, turned, second)
-            names = [self.joint_names[j] for j in own]
-            stops = {self.joint_names[j]: s for j in own if (s := self._limits(j)) is not None}
-            name = self._added(f"{self.bodies[b].name}_joints")
-            yield Series(
-                name, *ends, sliding=along, turning=about, names=names, stops=stops, apart=arm
-            )
+        if own != slides + hinges or axes is None or (len(hinges) > 1 and any(refs[len(slides) :])):
+            return None
+        rub = any(m.dof_frictionloss[m.jnt_dofadr[j]] for j in own)
+        if rub or (len(hinges) != 2 and apart > SQUARE * max(1.0, float(np.abs(points).max()))):
+            return None
+        letters, frame = axes
+        along, about = (letters[: len(slides)], letters[len(slides) :])
+        first, second, arm = self._met(hinges, points)
+        turned = frame
+        for j, ref in zip(own, refs, strict=True):
+            first -= ref * x[j] if j in slides else 0.0
+            turned = turned @ turn(AXES.index(about), ref) if j in hinges and ref else turned
+        ends = self._marker(parent, frame, first), self._marker(b, turned, second)
+        names = [self.joint_names[j] for j in own]
+        stops = {self.joint_names[j]: s for j in own if (s := self._limits(j)) is not None}
+        name = self._added(f"{self.bodies[b].name}_joints")
+        return Series(
+            name, *ends, sliding=along, turning=about, names=names, stops=stops, apart=arm
+        )
 
     def _met(self, hinges: list[int], points: Array) -> tuple[Array, Array, float]:
         """A point of the first hinge's axis and one of the last's, that are next to each other of two, and
@@ -431,10 +452,6 @@ class _Reader:
             if m.jnt_type[j] in (FREE, BALL):
                 self.left["springs, dampers and armatures of free and ball joints"] += any(values)
                 continue
-            several = m.body_jntnum[m.jnt_bodyid[j]] > 1
-            self.left["friction losses of several joints in one body"] += several and bool(
-                m.dof_frictionloss[d]
-            )
             self.left["springs and dampers of higher degree"] += self._has_powers("jnt", j)
             if values[0] or values[1]:
                 slack = float(m.qpos_spring[m.jnt_qposadr[j]]) if values[0] else 0.0
