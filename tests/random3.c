@@ -1,7 +1,9 @@
 /* random3.c -- an importer of FMI 3.0 that does anything at any time: random calls with random arguments, legal or not;
  * the FMU's sources are linked in, so that a sanitizer or valgrind sees all of it.
  *
- *   random3 TOKEN LIVES CALLS STEP VARIABLES STATES INDICATORS EXCHANGE EVENTS
+ *   random3 TOKEN LIVES CALLS STEP VARIABLES STATES INDICATORS EXCHANGE EVENTS [SWITCH]
+ *
+ * SWITCH: the value reference of the parameter of FMI-LS-DAE that half of the lives of Model Exchange set.
  *
  * Ends with 0 if no call returned anything but OK, Warning, Discard or Error, no value that was read with OK is not a
  * number, and whatever is not OK was told why. */
@@ -201,6 +203,20 @@ static void between(fmi3InstanceEnvironment environment, fmi3Float64 t, fmi3Bool
     now = held;
 }
 
+/* Continuous-time mode of DAE mode, where multipliers may be set too. */
+static void solve_for_multipliers(fmi3ValueReference parameter) {
+    const bool on = true;
+    bool flags[6];
+    double time;
+    EXPECT(fmi3EnterConfigurationMode(one) == fmi3OK);
+    EXPECT(fmi3SetBoolean(one, &parameter, 1, &on, 1) == fmi3OK);
+    EXPECT(fmi3ExitConfigurationMode(one) == fmi3OK);
+    EXPECT(fmi3EnterInitializationMode(one, true, 1e-6, 0, false, 0) == fmi3OK);
+    EXPECT(fmi3ExitInitializationMode(one) == fmi3OK);
+    EXPECT(fmi3UpdateDiscreteStates(one, flags, flags + 1, flags + 2, flags + 3, flags + 4, &time) == fmi3OK);
+    EXPECT(fmi3EnterContinuousTimeMode(one) == fmi3OK);
+}
+
 int main(int count, char **arguments) {
     if (count < 10) return 2;
     const char *token = arguments[1];
@@ -219,7 +235,8 @@ int main(int count, char **arguments) {
                                                      draw(3), NULL, logger, draw(2) ? between : NULL);
         if (one == NULL) continue; /* what was named cannot be */
         now = 0;
-        if (draw(4)) {
+        if (exchange && count > 10 && draw(2)) solve_for_multipliers((unsigned)atoi(arguments[10]));
+        else if (draw(4)) {
             EXPECT(fmi3EnterInitializationMode(one, true, 1e-6, 0, false, 0) == fmi3OK);
             EXPECT(fmi3ExitInitializationMode(one) == fmi3OK);
             if (!exchange) (void)fmi3EnterStepMode(one);

@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 import runs
+import two_feet
 from conftest import of_each_kind, scene_of
 from redundant import platform
 from runtime import FLAGS, RUNTIME_FILES, SANITIZE, compiler, objects
@@ -196,6 +197,7 @@ def random_calls(
     exchanged = description.modelExchange is not None
     clocks = any(v.type == "Clock" for v in description.modelVariables)
     given = [lives, 400, 0.07, count, *sizes, int(exchanged), int(clocks)]
+    given += [v.valueReference for v in description.modelVariables if v.name == "solver.dae"]
     run = subprocess.run(
         [*before, str(made), description.instantiationToken, *map(str, given)],
         capture_output=True,
@@ -224,6 +226,12 @@ def test_clocks_stand_random_calls_too(built):
         SANITIZE,
         200,
     )
+
+
+@pytest.mark.filterwarnings("ignore::lagfmu.testing.RedundantConstraintWarning")
+def test_multipliers_that_are_given_stand_random_calls_too(built):
+    """The same in DAE mode, of feet that stick together."""
+    random_calls(built(two_feet.model, whole=True, fmi=3, dae=True), SANITIZE, 200)
 
 
 @pytest.mark.thorough
