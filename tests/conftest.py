@@ -140,9 +140,9 @@ def without_a_page() -> Iterator[None]:
 
 @cache
 def model_file(name: str) -> ModelFile:
-    """A file of models/, or beside this one, loaded once."""
+    """A file of models/, or of the zoo, loaded once."""
     path = MODELS / f"{name}.py"
-    return load(path if path.exists() else Path(__file__).parent / path.name)
+    return load(path if path.exists() else Path(__file__).parent / "zoo" / path.name)
 
 
 def scene_of(name: str) -> tuple[ModelFile, Scene]:

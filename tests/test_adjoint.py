@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from redundant import platform
 from sympy import Abs, Piecewise, sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
 from zoo import point_mass
+from zoo.redundant import platform
 
 from lagfmu import Output, Parameter, Scene
 from lagfmu.bodies import Body, Gravity, Ground, Revolute, SpringDamper, Torsion, mechanism

@@ -11,6 +11,7 @@ from single import DISCARD
 from sympy import Rational, cos, sin, sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
 from zoo import point_mass
+from zoo.forces import candle
 
 from lagfmu import Contact, Holonomic, Model, Parameter
 from lagfmu.testing import find_compiler
@@ -249,21 +250,6 @@ def test_rollback_within_a_step_ahead_is_exact(library, name):
     if name != "Loop":  # whose particle is about to leave
         assert ahead
     one.does("FreeFMUstate", byref(state))
-
-
-def candle() -> Model:
-    """A bead on a line, driven by a force that ends with a root: nothing is defined after t = T."""
-    t = dynamicsymbols._t
-    x, y = dynamicsymbols("x y")
-    P, T = symbols("P T", positive=True)
-    return point_mass(
-        "Candle",
-        "x y",
-        [Holonomic("line", y - x)],
-        parameters=[Parameter(P, 3.0, "N"), Parameter(T, 1.0, "s")],
-        forces={x: P * sqrt(1 - t / T)},
-        start={x: 1.0, y: 1.0},
-    )
 
 
 @pytest.mark.parametrize("stop", [None, 1.0], ids=["no stop time", "stop time"])

@@ -13,10 +13,10 @@ import sympy as sp
 from conftest import MODELS
 from fmpy import calloc
 from instance import instance
-from linkages import hinged
 from runs import evenly
 from scipy.integrate import solve_ivp
 from scipy.special import roots_laguerre
+from zoo.linkages import hinged
 
 from lagfmu import derive, simulate
 from lagfmu.testing import Form, System, lower, prepare, sources_of

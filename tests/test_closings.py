@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import scene_of
-from impact_models import rod
 from instance import instance
 from runs import simulate_fmu
 from sympy import symbols
 from sympy.physics.mechanics import dynamicsymbols
 from zoo import point_mass
+from zoo.contacts import rod
 
 from lagfmu import Contact, Friction, Model, Nonholonomic, Parameter, Scene, multiplier, sweep
 from lagfmu.errors import ModelError

@@ -10,15 +10,13 @@ from dataclasses import replace
 import fmpy
 import numpy as np
 import pytest
-import redundant
-import two_feet
 from dae import MANIFEST, NAMESPACE, Importer, Manifest, solve
 from fmpy.validation import validate_fmu
-from linkages import FOUR_BAR, rods
 from sympy import sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 from test_forged_states import HEAD, forged
-from zoo import point_mass
+from zoo import point_mass, redundant, two_feet
+from zoo.linkages import FOUR_BAR, rods
 
 from lagfmu import (
     Contact,

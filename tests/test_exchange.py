@@ -11,8 +11,8 @@ import pytest
 from fmi2 import EventInfo, Library, Single
 from sympy import Rational, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
-from test_jumps import lifted
 from zoo import point_mass
+from zoo.forces import lifted
 
 from lagfmu import Contact, Holonomic, Input, Model, Parameter
 from lagfmu.testing import prepare

@@ -24,9 +24,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from instance import Instance, instance
 from single import DISCARD, ERROR, OK
-from sympy import cos, sin, sqrt, symbols
+from sympy import cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 from zoo import point_mass
+from zoo.linkages import four_points, isosceles, parallelogram
 
 from lagfmu import Holonomic, Input, Model, Parameter, names, simulate
 
@@ -346,9 +347,6 @@ def test_a_constraint_given_several_times_shares_its_force_equally(built, factor
             assert b[n] == pytest.approx(a[n], abs=1e-8), n
 
 
-J = symbols("J", positive=True)
-
-
 alpha = symbols("alpha", positive=True)
 R = symbols("R", positive=True)
 
@@ -432,36 +430,6 @@ phi, psi = dynamicsymbols("phi psi")
 r = symbols("r", positive=True)
 
 
-def isosceles() -> Model:
-    """Slider-crank whose crank and rod are equally long: f = x (x - 2 r cos phi) is zero on two branches,
-    which cross at phi = pi/2, x = 0, where df = 0."""
-    return Model(
-        name="Isosceles",
-        lagrangian=J * phi.diff() ** 2 / 2 + m * x.diff() ** 2 / 2,
-        coordinates={phi: "rad", x: "m"},
-        constraints=[Holonomic("rod", (x - r * cos(phi)) ** 2 + (r * sin(phi)) ** 2 - r**2)],
-        parameters=[Parameter(J, 1.0, "kg.m^2"), Parameter(m, 1.0, "kg"), Parameter(r, 0.5, "m")],
-        start={phi: 0.25, x: math.cos(0.25), phi.diff(): 1.0, x.diff(): -math.sin(0.25)},
-    )
-
-
-def parallelogram() -> Model:
-    """Four-bar with a coupler as long as the frame: it can turn into the anti-parallelogram where all bars
-    lie on one line (phi = 0): there the two rows of G depend on each other."""
-    theta = dynamicsymbols("theta")
-    return Model(
-        name="Parallelogram",
-        lagrangian=J * (phi.diff() ** 2 + theta.diff() ** 2 + psi.diff() ** 2) / 2,
-        coordinates={phi: "rad", theta: "rad", psi: "rad"},
-        constraints=[
-            Holonomic("along", r * cos(phi) + 2 * r * cos(theta) - r * cos(psi) - 2 * r),
-            Holonomic("across", r * sin(phi) + 2 * r * sin(theta) - r * sin(psi)),
-        ],
-        parameters=[Parameter(J, 1.0, "kg.m^2"), Parameter(r, 0.5, "m")],
-        start={phi: -0.5, theta: 0.0, psi: -0.5, phi.diff(): 1.0, psi.diff(): 1.0},
-    )
-
-
 SMOOTH = {  # model, constraints, how long [s], what stays zero on the branch that goes on smoothly
     "crank": (isosceles, ["rod"], 3.0, lambda a: [a["x"] - math.cos(a["phi"])]),
     "parallelogram": (
@@ -489,39 +457,6 @@ def test_a_way_through_a_singular_point_is_right_or_refused(built, name, toleran
         assert all(abs(a[f"residual.{row}"]) < 1e-12 for row in rows)
         assert a["energy.kinetic"] == pytest.approx(seen[0]["energy.kinetic"], rel=1e3 * tolerance)
         assert missed(a) == pytest.approx([0.0] * len(missed(a)), abs=1e3 * tolerance)
-
-
-def four_points(again: bool) -> Model:
-    """The parallelogram as two points on cranks and a coupler, under gravity, turning over and over.
-    `again`: the length of a crank is said twice, by its square and by itself."""
-    xs, ys = dynamicsymbols("x1:3"), dynamicsymbols("y1:3")
-    speeds = [a.diff() ** 2 + b.diff() ** 2 for a, b in zip(xs, ys, strict=True)]
-    a, w = -0.5, 9.0
-    at = {
-        xs[0]: math.cos(a) / 2,
-        xs[1]: 1 + math.cos(a) / 2,
-        ys[0]: math.sin(a) / 2,
-        ys[1]: math.sin(a) / 2,
-    }
-    rates = {q.diff(): w / 2 * (-math.sin(a) if q in xs else math.cos(a)) for q in (*xs, *ys)}
-    return Model(
-        name="FourPointsAgain" if again else "FourPoints",
-        lagrangian=m * (speeds[0] + 2 * speeds[1]) / 2 - m * g * (ys[0] + 2 * ys[1]),
-        coordinates=dict.fromkeys((*xs, *ys), "m"),
-        constraints=[
-            Holonomic("crank", xs[0] ** 2 + ys[0] ** 2 - r**2),
-            Holonomic("coupler", (xs[1] - xs[0]) ** 2 + (ys[1] - ys[0]) ** 2 - L**2),
-            Holonomic("rocker", (xs[1] - L) ** 2 + ys[1] ** 2 - r**2),
-            *([Holonomic("again", sqrt(xs[0] ** 2 + ys[0] ** 2) - r)] if again else []),
-        ],
-        parameters=[
-            Parameter(m, 1.0, "kg"),
-            Parameter(g, g0, "m/s^2"),
-            Parameter(r, 0.5, "m"),
-            Parameter(L, 1.0, "m"),
-        ],
-        start=at | rates,
-    )
 
 
 @pytest.mark.parametrize("again", [False, True])

@@ -18,8 +18,8 @@ from conftest import scene_of
 from fmi3 import Single
 from single import ERROR
 from sympy.physics.mechanics import dynamicsymbols
-from test_jumps import MODELS as JUMPS
 from zoo import point_mass
+from zoo.forces import JUMPS
 
 from lagfmu import Contact, Input, Model
 from lagfmu.testing import find_compiler

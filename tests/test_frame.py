@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from linkages import straight_line
+from zoo.linkages import straight_line
 
 from lagfmu import Scene, simulate
 from lagfmu.testing import StartMovedWarning

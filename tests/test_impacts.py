@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from impact_models import G, corner, cradle, e, m, restitution, rod, table, wedge
 from instance import instance
 from runs import simulate_fmu
 from sympy import cos, symbols
 from sympy.physics.mechanics import dynamicsymbols
 from zoo import point_mass
+from zoo.contacts import G, corner, cradle, e, m, restitution, rod, table, wedge
 
 from lagfmu import Contact, Model, Parameter, simulate
 from lagfmu.errors import LagfmuError

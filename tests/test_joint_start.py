@@ -16,9 +16,9 @@ import pytest
 from fmpy.fmi1 import FMICallException
 from fmpy.validation import validate_fmu
 from instance import instance
-from linkages import hinged
 from runs import evenly, simulate_fmu, sources
 from sympy import Symbol
+from zoo.linkages import SET_OUT, cart_arm, hinged
 
 from lagfmu import Model, Parameter, Scene, fit, sensitivity, sweep, verify
 from lagfmu.bodies import (
@@ -239,27 +239,13 @@ def test_of_two_branches_it_is_the_one_that_leads_on(built: Any) -> None:
         )
 
 
-GIVEN = {"angle.A": 0.3, "der(angle.A)": -2.0, "angle.B": 0.5}
-
-
-def cart_arm() -> Model:
-    """A pendulum of two links on a cart that nothing holds, in space."""
-    bodies = [Body(n, 1.0, (0.02, 0.01, 0.03)) for n in ("cart", "upper", "lower")]
-    cart, upper, lower = bodies
-    joints = [
-        Revolute("A", cart.at((0.1, 0, 0)), upper.at((-0.2, 0, 0)), axis="y"),
-        Revolute("B", upper.at((0.2, 0, 0)), lower.at((0, 0.3, 0)), axis="z"),
-    ]
-    return mechanism("CartArm", bodies=bodies, joints=joints, start=GIVEN)
-
-
 def test_what_is_not_asked_for_stays_where_it_can(built: Any) -> None:
     """Of a pendulum on a cart that nothing holds: the other angle that the model gives, and a coordinate that
     the importer sets, to the digit; the rest moves least, so that the centre of mass does not."""
     fmu = built(cart_arm())
     before = first(fmu, {})
     found = first(fmu, {"angle.B": 7.0, "der(angle.B)": 3.0})
-    for name, value in {**GIVEN, "angle.B": 7.0, "der(angle.B)": 3.0}.items():
+    for name, value in {**SET_OUT, "angle.B": 7.0, "der(angle.B)": 3.0}.items():
         assert found[name] == pytest.approx(value, rel=1e-13)  # the second turn of B too
     for x in "xyz":
         places = [f"{body}.position.{x}" for body in ("cart", "upper", "lower")]

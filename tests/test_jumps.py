@@ -20,92 +20,17 @@ from sympy import (
     symbols,
 )
 from sympy.physics.mechanics import dynamicsymbols
-from zoo import point_mass
+from zoo.forces import JUMPS, F, G, L, T, cart, k, m, t, u, v, x
 
-from lagfmu import Contact, Input, Model, Parameter, derive, simulate
+from lagfmu import Model, Parameter, derive, simulate
 from lagfmu.errors import ModelError
 from lagfmu.testing import Form, jumps_of, prepare, with_jumps
-
-G = 9.81
-x, y, u = dynamicsymbols("x y u")
-m, g, F, k, L, T = symbols("m g F k L T", positive=True)
-t = dynamicsymbols._t
-v = x.diff()
-
-
-def cart(name, force, lagrangian=0, **start):
-    """A cart of 1 kg on a straight track, F = 2 N, k = 10 N/m, L = 1 m, T = 1 s, and an input u [N]."""
-    return Model(
-        name=name,
-        lagrangian=m * v**2 / 2 + lagrangian,
-        coordinates={x: "m"},
-        forces={x: force},
-        parameters=[
-            *(Parameter(m, 1.0, "kg"), Parameter(F, 2.0, "N"), Parameter(k, 10.0, "N/m")),
-            *(Parameter(L, 1.0, "m"), Parameter(T, 1.0, "s")),
-        ],
-        inputs=[Input(u, "N")],
-        start={x: start.get("x", 0.0), v: start.get("v", 0.0)},
-    )
-
-
-def lifted():
-    """A block on a floor that a force of three times its weight begins to pull up at t = T/2."""
-    return point_mass(
-        "Lifted",
-        "y",
-        [Contact("floor", y)],
-        up=y,
-        gravity=G,
-        parameters=[Parameter(T, 1.0, "s")],
-        forces={y: 3 * m * g * Heaviside(t - T / 2)},
-        start={y: 0.0},
-    )
-
-
-def chased():
-    """A free body, and a gate u that gives it 2 N sideways while it is ahead of the gate by L."""
-    return Model(
-        name="Chased",
-        lagrangian=m * (v**2 + y.diff() ** 2) / 2,
-        coordinates={x: "m", y: "m"},
-        forces={y: F * Heaviside(x - u - L)},
-        parameters=[Parameter(m, 1.0, "kg"), Parameter(F, 2.0, "N"), Parameter(L, 1.0, "m")],
-        inputs=[Input(u, "m")],
-        start={x: 0.0},
-    )
-
-
-def hung():
-    """Two blocks on a floor, the second pulled up with 2 m g as soon as the first is off the ground."""
-    return point_mass(
-        "Hung",
-        "x y",
-        [Contact("first", x), Contact("second", y)],
-        up=x + y,
-        gravity=G,
-        forces={x: u, y: 2 * m * g * Heaviside(x)},
-        inputs=[Input(u, "N")],
-        start={x: 0.0, y: 0.0},
-    )
-
-
-MODELS = {
-    "Chased": chased,
-    "Hung": hung,
-    "Valley": lambda: cart("Valley", u, -F * Abs(x), x=1.0),
-    "Pulse": lambda: cart("Pulse", Piecewise((F, (t > T / 4) & (t < T / 2)), (0, True)) + 0 * u),
-    "Stairs": lambda: cart("Stairs", F * floor(2 * t / T)),
-    "Switched": lambda: cart("Switched", F * sign(u)),
-    "Gate": lambda: cart("Gate", F * Heaviside(x - L) * Heaviside(L + L / 1000 - x), v=100.0),
-    "Lifted": lifted,
-}
 
 
 @pytest.fixture
 def own(built):
     """own(NAME): the FMU of one of the models above."""
-    return lambda name: built(MODELS[name]())
+    return lambda name: built(JUMPS[name]())
 
 
 @pytest.mark.parametrize("step", [0.13, 4.0])

@@ -9,7 +9,6 @@ from pathlib import Path
 import fmpy
 import numpy as np
 import pytest
-import whipple
 from conftest import MODELS
 from fmpy.fmi2 import FMU2Model
 from runs import unpacked
@@ -18,7 +17,7 @@ from scipy.special import roots_laguerre
 from sympy import Matrix, Rational, cos, diff, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 from typer.testing import CliRunner
-from zoo import point_mass
+from zoo import point_mass, whipple
 
 import lagfmu
 from lagfmu import (

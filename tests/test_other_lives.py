@@ -8,7 +8,7 @@ from ctypes import c_double
 import pytest
 from fmi2 import Single
 from single import ERROR
-from test_ahead import candle
+from zoo.forces import candle
 
 LIVES = {  # when the state is saved [s], and another life: its parameters and how long it lasts [s]
     "BouncingBall": (0.6, {"e": 0.0, "y": 0.2}, 2.0),  # rises again; lies on the floor

@@ -14,13 +14,13 @@ import pytest
 from conftest import of_each_kind
 from fmpy.fmi1 import FMICallException
 from instance import instance
-from linkages import rods
-from redundant import SYSTEMS
 from runs import simulate_fmu
 from sympy import sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
-from tops import door
 from zoo import point_mass
+from zoo.linkages import rods
+from zoo.redundant import SYSTEMS
+from zoo.tops import door
 
 from lagfmu import Contact, Holonomic, Model, Output, Parameter, Scene, multiplier, simulate
 from lagfmu.errors import ModelError, SimulationError

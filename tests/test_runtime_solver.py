@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from impact_models import cradle
-from linkages import FOUR_BAR, TIME, rods
 from runtime import RUNTIME_FILES, compile_library
 from sympy import Rational, cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 from zoo import point_mass
+from zoo.contacts import cradle
+from zoo.linkages import FOUR_BAR, TIME, rods
 
 from lagfmu import (
     Contact,

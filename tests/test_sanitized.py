@@ -13,12 +13,11 @@ import pytest
 import runs
 import two_feet
 from conftest import of_each_kind, scene_of
-from redundant import platform
 from runtime import FLAGS, RUNTIME_FILES, SANITIZE, compiler, objects
-from test_extremes import isosceles
-from test_joint_start import cart_arm
-from test_jumps import MODELS as JUMPS
-from test_speeds_native import ball, geared
+from zoo.forces import JUMPS
+from zoo.linkages import cart_arm, isosceles
+from zoo.redundant import platform
+from zoo.tops import geared, thrown_ball
 
 from lagfmu import Model, Peak, Scene
 from lagfmu.testing import GENERATED, unbundled
@@ -69,7 +68,7 @@ OWN = {
     "Platform": lambda: platform(True),
     "Isosceles": isosceles,
     "Peaks": peaks,
-    "Thrown": ball,
+    "Thrown": thrown_ball,
     "Geared": geared,
     "CartArm": cart_arm,
     **JUMPS,

@@ -9,7 +9,7 @@ import pytest
 import sympy as sp
 from scipy.linalg import expm
 from sympy.physics.mechanics import dynamicsymbols
-from tops import E, W, chain, reference, top, turning
+from zoo.tops import E, W, chain, reference, top, turning
 
 from lagfmu import (
     Holonomic,

@@ -17,19 +17,14 @@ from runs import simulate_fmu
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 from single import DISCARD
-from sympy.physics.mechanics import dynamicsymbols
-from tops import E, R, W, body, turning
+from zoo.tops import E, R, W, body, geared, thrown_ball
 
 from lagfmu import (
     Contact,
-    Friction,
-    Holonomic,
     Model,
-    Nonholonomic,
     Parameter,
     Peak,
     Scene,
-    multiplier,
     rotation_matrix,
 )
 from lagfmu.errors import DerivationError
@@ -231,43 +226,13 @@ def test_every_method_turns_the_top_alike(built: Built, method: str) -> None:
     assert steps < 600
 
 
-def ball() -> Model:
-    """A solid ball over a rough floor."""
-    m, g, mu, r = sp.symbols("m g mu r", positive=True)
-    e = sp.Symbol("e", nonnegative=True)
-    x, y, z = R
-    spin = rotation_matrix(E) * sp.Matrix(W)
-    kinetic = m * sum(s.diff() ** 2 for s in R) / 2 + m * r**2 * sum(w**2 for w in W) / 5
-    return Model(
-        "Thrown",
-        lagrangian=kinetic - m * g * z,
-        coordinates={**dict.fromkeys(R, "m"), **dict.fromkeys(E, "1")},
-        speeds=dict.fromkeys(W, "rad/s"),
-        kinematics=turning(),
-        constraints=[
-            Contact("floor", z - r, restitution=e),
-            Nonholonomic("ahead", x.diff() - r * spin[1], while_closed="floor"),
-            Nonholonomic("aside", y.diff() + r * spin[0], while_closed="floor"),
-            Friction("grip", of=["ahead", "aside"], normal=multiplier("floor"), static=mu),
-        ],
-        parameters=[
-            Parameter(m, MASS, "kg"),
-            Parameter(r, 0.1, "m"),
-            Parameter(g, G, "m/s2"),
-            Parameter(mu, 0.3, "1"),
-            Parameter(e, 0.0, "1"),
-        ],
-        start={x.diff(): 3.0, y.diff(): 4.0, z: 0.1, E[0]: 0.8, E[1]: 0.6},
-    )
-
-
 @pytest.mark.parametrize("kind", ["CoSimulation", "ModelExchange"])
 def test_a_ball_thrown_without_spin_rolls_after_its_time(built: Built, kind: str) -> None:
     """It rolls after 2 v0/(7 mu g), at 5/7 of its velocity, whatever its attitude; what friction takes is
     missing in the energy."""
     names = ["der(x)", "der(y)", "sticking.grip.time", "energy.total", "energy.dissipated"]
     run = simulate_fmu(
-        built(ball()),
+        built(thrown_ball()),
         stop_time=1.0,
         output_interval=0.05,
         relative_tolerance=1e-9,
@@ -286,7 +251,7 @@ def test_a_bouncing_ball_takes_spin_from_the_floor(built: Built) -> None:
     mu times the normal ones take 5/2 of their part of the velocity as spin; energy is balanced."""
     names = ["der(x)", "der(y)", "wx", "wy", "wz", *QUATERNION]
     names += ["closing.floor.count", "closing.floor.impulse", "energy.total", "energy.dissipated"]
-    with instance(built(ball())) as one:
+    with instance(built(thrown_ball())) as one:
         one.start({"z": 0.6, "e": 0.5}, tolerance=1e-10)
         one.step(0.4)
         found = {n: one.get(n) for n in names}
@@ -302,23 +267,6 @@ def test_a_bouncing_ball_takes_spin_from_the_floor(built: Built) -> None:
     np.testing.assert_allclose(spin, [-0.8 * gained, 0.6 * gained, 0], rtol=1e-9, atol=1e-9)
     begin = MASS * (25 / 2 + G * 0.6)
     assert end == pytest.approx(begin, rel=1e-10)
-
-
-def geared() -> Model:
-    """A wheel about its third axis and a shaft that it drives 7 : 3 by its angle."""
-    phi, psi = dynamicsymbols("phi psi")
-    k = sp.Symbol("k", positive=True)
-    return Model(
-        "Geared",
-        coordinates={**dict.fromkeys(E, "1"), phi: "rad", psi: "rad"},
-        speeds=dict.fromkeys(W, "rad/s"),
-        kinematics={**turning(), phi: W[2]},
-        unwrapped={phi: 2 * sp.atan2(E[3], E[0])},
-        kinetic_energy=k * (sum(w**2 for w in W) + psi.diff() ** 2) / 2,
-        constraints=[Holonomic("gear", 7 * phi - 3 * psi)],
-        parameters=[Parameter(k, 1.0, "kg.m2")],
-        start={E[0]: 1.0, W[2]: 30.0, psi.diff(): 70.0},
-    )
 
 
 def test_a_gear_goes_through_a_thousand_turns(built: Built) -> None:

@@ -13,11 +13,11 @@ import pytest
 from fmpy import read_model_description, simulate_fmu
 from fmpy.fmi1 import FMICallException
 from instance import instance
-from linkages import pinned_rod
 from sympy import cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 from typer.testing import CliRunner
 from zoo import point_mass
+from zoo.linkages import pinned_rod
 
 from lagfmu import Holonomic, Model, Parameter, Scene, simulate, sweep
 from lagfmu.errors import ModelError, SimulationError
@@ -29,7 +29,7 @@ HALF = 0.75  # m, from the pivot to the middle of the rod
 FILE = """
 import sys
 sys.path.insert(0, {folder!r})
-from linkages import pinned_rod
+from zoo.linkages import pinned_rod
 from lagfmu import Scene
 from sympy.physics.mechanics import dynamicsymbols
 x, theta = dynamicsymbols("x theta")

@@ -1,6 +1,8 @@
 """The zoo: the mechanical systems that tests are made with, by chapter.
 
-`point_mass` is what most of them begin from.
+`point_mass` is what most of them begin from.  contacts: several that close together; forces: that jump or
+end; linkages; redundant: rows that follow from others; tops: rigid bodies in unit quaternions; whipple: a
+bicycle; puck, two_feet: model files, with friction.
 """
 
 from __future__ import annotations

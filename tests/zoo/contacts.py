@@ -7,9 +7,9 @@ from typing import Any
 
 from sympy import Rational, cos, sin, sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
-from zoo import point_mass
 
 from lagfmu import Contact, Model, Parameter
+from zoo import point_mass
 
 G = 9.81
 m, g, J, l = symbols("m g J l", positive=True)  # noqa: E741

@@ -11,7 +11,16 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import Holonomic, Model, Parameter, rotation_matrix
+from lagfmu import (
+    Contact,
+    Friction,
+    Holonomic,
+    Model,
+    Nonholonomic,
+    Parameter,
+    multiplier,
+    rotation_matrix,
+)
 
 E = dynamicsymbols("e0 e1 e2 e3")
 W = dynamicsymbols("wx wy wz")
@@ -161,4 +170,51 @@ def chain(n: int) -> Model:
             *(Parameter(a, 0.5, "m"), Parameter(g, 9.81, "m/s2")),
         ],
         start=start,
+    )
+
+
+def thrown_ball() -> Model:
+    """A solid ball over a rough floor."""
+    m, g, mu, r = sp.symbols("m g mu r", positive=True)
+    e = sp.Symbol("e", nonnegative=True)
+    x, y, z = R
+    spin = rotation_matrix(E) * sp.Matrix(W)
+    kinetic = m * sum(s.diff() ** 2 for s in R) / 2 + m * r**2 * sum(w**2 for w in W) / 5
+    return Model(
+        "Thrown",
+        lagrangian=kinetic - m * g * z,
+        coordinates={**dict.fromkeys(R, "m"), **dict.fromkeys(E, "1")},
+        speeds=dict.fromkeys(W, "rad/s"),
+        kinematics=turning(),
+        constraints=[
+            Contact("floor", z - r, restitution=e),
+            Nonholonomic("ahead", x.diff() - r * spin[1], while_closed="floor"),
+            Nonholonomic("aside", y.diff() + r * spin[0], while_closed="floor"),
+            Friction("grip", of=["ahead", "aside"], normal=multiplier("floor"), static=mu),
+        ],
+        parameters=[
+            Parameter(m, 2.0, "kg"),
+            Parameter(r, 0.1, "m"),
+            Parameter(g, 9.81, "m/s2"),
+            Parameter(mu, 0.3, "1"),
+            Parameter(e, 0.0, "1"),
+        ],
+        start={x.diff(): 3.0, y.diff(): 4.0, z: 0.1, E[0]: 0.8, E[1]: 0.6},
+    )
+
+
+def geared() -> Model:
+    """A wheel about its third axis and a shaft that it drives 7 : 3 by its angle."""
+    phi, psi = dynamicsymbols("phi psi")
+    k = sp.Symbol("k", positive=True)
+    return Model(
+        "Geared",
+        coordinates={**dict.fromkeys(E, "1"), phi: "rad", psi: "rad"},
+        speeds=dict.fromkeys(W, "rad/s"),
+        kinematics={**turning(), phi: W[2]},
+        unwrapped={phi: 2 * sp.atan2(E[3], E[0])},
+        kinetic_energy=k * (sum(w**2 for w in W) + psi.diff() ** 2) / 2,
+        constraints=[Holonomic("gear", 7 * phi - 3 * psi)],
+        parameters=[Parameter(k, 1.0, "kg.m2")],
+        start={E[0]: 1.0, W[2]: 30.0, psi.diff(): 70.0},
     )

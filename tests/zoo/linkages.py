@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from sympy import S, cos, sin, symbols
+from sympy import S, cos, sin, sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
-from zoo import point_mass
 
 from lagfmu import Holonomic, Model, Parameter
 from lagfmu.bodies import Body, Ground, Revolute, mechanism
+from zoo import point_mass
 
 TIME = dynamicsymbols._t
 
@@ -141,4 +142,85 @@ def straight_line(turned: float) -> Model:
             Parameter(length, 1.0, "m"),
         ],
         start=start,
+    )
+
+
+SET_OUT = {"angle.A": 0.3, "der(angle.A)": -2.0, "angle.B": 0.5}
+
+
+def cart_arm() -> Model:
+    """A pendulum of two links on a cart that nothing holds, in space."""
+    bodies = [Body(n, 1.0, (0.02, 0.01, 0.03)) for n in ("cart", "upper", "lower")]
+    cart, upper, lower = bodies
+    joints = [
+        Revolute("A", cart.at((0.1, 0, 0)), upper.at((-0.2, 0, 0)), axis="y"),
+        Revolute("B", upper.at((0.2, 0, 0)), lower.at((0, 0.3, 0)), axis="z"),
+    ]
+    return mechanism("CartArm", bodies=bodies, joints=joints, start=SET_OUT)
+
+
+def isosceles() -> Model:
+    """Slider-crank whose crank and rod are equally long: f = x (x - 2 r cos phi) is zero on two branches,
+    which cross at phi = pi/2, x = 0, where df = 0."""
+    phi, x = dynamicsymbols("phi x")
+    J, m, r = symbols("J m r", positive=True)
+    return Model(
+        name="Isosceles",
+        lagrangian=J * phi.diff() ** 2 / 2 + m * x.diff() ** 2 / 2,
+        coordinates={phi: "rad", x: "m"},
+        constraints=[Holonomic("rod", (x - r * cos(phi)) ** 2 + (r * sin(phi)) ** 2 - r**2)],
+        parameters=[Parameter(J, 1.0, "kg.m^2"), Parameter(m, 1.0, "kg"), Parameter(r, 0.5, "m")],
+        start={phi: 0.25, x: math.cos(0.25), phi.diff(): 1.0, x.diff(): -math.sin(0.25)},
+    )
+
+
+def parallelogram() -> Model:
+    """Four-bar with a coupler as long as the frame: it can turn into the anti-parallelogram where all bars
+    lie on one line (phi = 0): there the two rows of G depend on each other."""
+    phi, theta, psi = dynamicsymbols("phi theta psi")
+    J, r = symbols("J r", positive=True)
+    return Model(
+        name="Parallelogram",
+        lagrangian=J * (phi.diff() ** 2 + theta.diff() ** 2 + psi.diff() ** 2) / 2,
+        coordinates={phi: "rad", theta: "rad", psi: "rad"},
+        constraints=[
+            Holonomic("along", r * cos(phi) + 2 * r * cos(theta) - r * cos(psi) - 2 * r),
+            Holonomic("across", r * sin(phi) + 2 * r * sin(theta) - r * sin(psi)),
+        ],
+        parameters=[Parameter(J, 1.0, "kg.m^2"), Parameter(r, 0.5, "m")],
+        start={phi: -0.5, theta: 0.0, psi: -0.5, phi.diff(): 1.0, psi.diff(): 1.0},
+    )
+
+
+def four_points(again: bool) -> Model:
+    """The parallelogram as two points on cranks and a coupler, under gravity, turning over and over.
+    `again`: the length of a crank is said twice, by its square and by itself."""
+    xs, ys = dynamicsymbols("x1:3"), dynamicsymbols("y1:3")
+    m, g, r, L = symbols("m g r L", positive=True)
+    speeds = [a.diff() ** 2 + b.diff() ** 2 for a, b in zip(xs, ys, strict=True)]
+    a, w = -0.5, 9.0
+    at = {
+        xs[0]: math.cos(a) / 2,
+        xs[1]: 1 + math.cos(a) / 2,
+        ys[0]: math.sin(a) / 2,
+        ys[1]: math.sin(a) / 2,
+    }
+    rates = {q.diff(): w / 2 * (-math.sin(a) if q in xs else math.cos(a)) for q in (*xs, *ys)}
+    return Model(
+        name="FourPointsAgain" if again else "FourPoints",
+        lagrangian=m * (speeds[0] + 2 * speeds[1]) / 2 - m * g * (ys[0] + 2 * ys[1]),
+        coordinates=dict.fromkeys((*xs, *ys), "m"),
+        constraints=[
+            Holonomic("crank", xs[0] ** 2 + ys[0] ** 2 - r**2),
+            Holonomic("coupler", (xs[1] - xs[0]) ** 2 + (ys[1] - ys[0]) ** 2 - L**2),
+            Holonomic("rocker", (xs[1] - L) ** 2 + ys[1] ** 2 - r**2),
+            *([Holonomic("again", sqrt(xs[0] ** 2 + ys[0] ** 2) - r)] if again else []),
+        ],
+        parameters=[
+            Parameter(m, 1.0, "kg"),
+            Parameter(g, 9.81, "m/s^2"),
+            Parameter(r, 0.5, "m"),
+            Parameter(L, 1.0, "m"),
+        ],
+        start=at | rates,
     )

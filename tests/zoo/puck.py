@@ -2,9 +2,9 @@
 
 from sympy import cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
-from zoo import point_mass
 
 from lagfmu import Contact, Friction, Nonholonomic, Parameter, multiplier
+from zoo import point_mass
 
 x, y, z = dynamicsymbols("x y z")
 mu_s, mu_k, alpha, e = symbols("mu_s mu_k alpha e", nonnegative=True)

@@ -2,9 +2,9 @@
 
 from sympy import cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
-from zoo import point_mass
 
 from lagfmu import Contact, Friction, Nonholonomic, Parameter, multiplier
+from zoo import point_mass
 
 x, y, theta = dynamicsymbols("x y theta")
 a, h, J = symbols("a h J", positive=True)
