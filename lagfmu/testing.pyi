@@ -147,7 +147,7 @@ from .studio.tradeoff.measure import Point, Tradeoff, measure
 from .studio.tradeoff.measure import table as tradeoff_table
 from .studio.tradeoff.reference import OWN, Setting, observe, opened, quantities, refer
 from .verification import pipeline
-from .verification.closed_forms import Compiled, applies, check_closed_form, landed
+from .verification.closed_forms import applies, check_closed_form, landed
 from .verification.laws import CarriedLaws
 from .verification.pipeline import EXIT_CODES, NOT_RUN, TERMINATED, WRONG_USAGE
 from .verification.plot import COLOURS, figure_of, moments, panels

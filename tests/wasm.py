@@ -10,7 +10,7 @@ import wasmtime
 
 
 class Module:
-    """One instance of a module that page/wasm.py compiled; `facts` as on the page."""
+    """One instance of a module that studio/live/play.py compiled; `facts` as on the page."""
 
     def __init__(self, module: bytes, facts: dict[str, Any]) -> None:
         engine = wasmtime.Engine()

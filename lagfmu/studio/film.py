@@ -1,7 +1,7 @@
 """A run as a film: the mechanism of the model's picture, forces of constraint as arrows, a curve beside.
 
 A .gif, .webp or .mp4 file is drawn here; a .html file is the live page with the run in it
-(live/recording.py).
+(live/play.py).
 """
 
 from __future__ import annotations
