@@ -27,6 +27,7 @@ SOURCES = [
     "cod.c",
     "condition.c",
     "dependent.c",
+    "kept.c",
     "kkt.c",
     "ldlt.c",
     "leastnorm.c",
@@ -109,8 +110,8 @@ Bench *bench(int n, int m, int masses, int entries, const int *mass_row, const i
 }
 
 size_t bench_bytes(const Bench *b) { return b->bytes; }
-int bench_factor(Bench *b, const double *M, const double *G, const int *active) {
-    return linear_factor(&b->linear, M, G, active);
+int bench_factor(Bench *b, const double *M, const double *G, const int *active, const int *basis) {
+    return linear_factor_kept(&b->linear, M, G, active, basis);
 }
 int bench_solve(Bench *b, const double *rhs, const double *c, double *x, double *lambda) {
     return linear_solve(&b->linear, rhs, c, x, lambda);
@@ -207,13 +208,15 @@ class Bench:
         if status:
             raise RefusedError(self.lib.bench_why(self.handle).decode())
 
-    def factor(self, M, G, active=None):
-        """Factors the matrices; the values at the patterns are all that C sees."""
+    def factor(self, M, G, active=None, basis=None):
+        """Factors the matrices, by the rows of a basis if it is known; C sees the values at the patterns
+        alone."""
         active = np.ones(self.m) if active is None else active
         self.kept = (
             doubles(M[i, j] for i, j in self.mass),
             doubles(G[k, j] for k, j in self.jacobian),
             integers(active),
+            None if basis is None else integers(basis),
         )
         self.check(self.lib.bench_factor(self.handle, *self.kept))
 
@@ -227,9 +230,9 @@ class Bench:
         assert np.isfinite(lam).all()
         return Solution(x, lam, unique)
 
-    def answer(self, M, b, G, c, active=None):
+    def answer(self, M, b, G, c, active=None, basis=None):
         """Factors and solves."""
-        self.factor(M, G, active)
+        self.factor(M, G, active, basis)
         return self.solve(b, c)
 
     @property

@@ -26,7 +26,7 @@ from linear_bench import (
 )
 from runtime import SANITIZE, compile_library, compiler
 
-SCHUR, KKT, ORTHOGONAL, LEAST_NORM = range(4)
+SCHUR, KKT, ORTHOGONAL, LEAST_NORM, _, KEPT = range(6)
 
 
 @pytest.fixture(scope="module")
@@ -627,6 +627,69 @@ def test_the_condition_of_an_arm_is_bounded_without_its_trace(library, seed):
 
 @pytest.mark.thorough
 @pytest.mark.skipif("LAGFMU_SANITIZE" in os.environ, reason="this is the run under the sanitizers")
+def redundant(seed, more, off=0.0):
+    """M of two bodies in space, five rows, `more` that follow from them but for a part `off` of their own;
+    some of the rows touch one body alone: not all multipliers are in doubt.  -> M, b, G, c and a basis."""
+    rng = np.random.default_rng(seed)
+    n, kept = 12, 5
+    half = rng.standard_normal((2, 3, 3))
+    M = np.zeros((n, n))
+    for k, factor in enumerate(half):
+        at = slice(6 * k, 6 * k + 3)
+        M[at, at] = 10 ** rng.uniform(-2, 2) * np.eye(3)
+        M[6 * k + 3 : 6 * k + 6, 6 * k + 3 : 6 * k + 6] = factor @ factor.T + 0.1 * np.eye(3)
+    G = rng.standard_normal((kept, n)) * 10 ** rng.uniform(-2, 2, (kept, 1))
+    G[:3, 6:] = 0
+    mixed = rng.standard_normal((more, 3)) / np.linalg.norm(G[:3], axis=1)
+    c = rng.standard_normal(kept)
+    own = off * rng.standard_normal((more, n))
+    order = rng.permutation(kept + more)
+    basis = (np.arange(kept + more) < kept)[order]
+    return (
+        M,
+        rng.standard_normal(n),
+        np.vstack((G, mixed @ G[:3] + own))[order],
+        np.concatenate((c, mixed @ c[:3]))[order],
+        basis,
+    )
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("more", [1, 3])
+def test_rows_that_stand_for_all_share_forces_as_the_decomposition_of_all_does(library, seed, more):
+    """The multipliers of least norm, and which of them are unique, are facts of all rows: known rows that
+    stand for them, whichever, change neither, nor the accelerations."""
+    M, b, G, c, basis = redundant(seed, more)
+    bench = Bench(library, len(b), len(c), *patterns(M, G))
+    whole = bench.answer(M, b, G, c)
+    assert bench.rung == ORTHOGONAL
+    by_basis = bench.answer(M, b, G, c, basis=basis)
+    assert bench.rung == KEPT
+    np.testing.assert_array_equal(by_basis.unique, whole.unique)
+    assert 0 < whole.unique.sum() < len(c)
+    np.testing.assert_allclose(by_basis.x, whole.x, rtol=0, atol=1e-10 * np.abs(whole.x).max())
+    size = np.sqrt(np.einsum("ki,ij,kj->k", G, np.linalg.inv(M), G))
+    least = np.abs(size * whole.lam).max()
+    np.testing.assert_allclose(size * by_basis.lam, size * whole.lam, rtol=0, atol=1e-10 * least)
+
+
+@pytest.mark.parametrize("off", [1e-11, 1e-9, 1e-6])
+def test_rows_that_no_longer_stand_for_all_are_not_taken_for_it(library, off):
+    """A row that stands out by more than rounding is independent: no multiplier is in doubt."""
+    M, b, G, c, basis = redundant(0, 1, off)
+    bench = Bench(library, len(b), len(c), *patterns(M, G))
+    assert bench.answer(M, b, G, c, basis=basis).unique.all()
+    assert bench.rung != KEPT
+
+
+def test_rows_that_contradict_those_that_stand_for_them_are_refused(library):
+    """Whoever asks of a body to accelerate by two numbers is told which rows do."""
+    M, b, G, c, basis = redundant(1, 1)
+    bench = Bench(library, len(b), len(c), *patterns(M, G))
+    with pytest.raises(RefusedError, match="contradict each other"):
+        bench.answer(M, b, G, c + ~basis * np.abs(c).max(), basis=basis)
+
+
 def test_clean_under_the_sanitizers():
     """The whole set once more with every memory access and every undefined operation watched."""
     found = subprocess.run(

@@ -29,6 +29,7 @@ static Status choose_rows(Instance *x) {
     Solver *s = &x->solver;
     if (s->system->m < 2) return OK;
     segment_begin(s);
+    s->stepped.basis = NULL;
     x->version += 1;
     if (segment_motion_near(s, segment_instant(s, s->state.now.t), s->state.q, s->state.v) != OK) return FAILED;
     segment_choose_rows(s);

@@ -17,6 +17,12 @@ static size_t ints(int n, int m) {
     return larger_size((size_t)weighted_ints(n, m), (size_t)least_norm_ints(n, m));
 }
 
+static int keep_rows(Linear *l, const int *kept) { return kept_factor(l, kept); }
+
+static int solve_kept(Linear *l, const double *b, const double *c, double *x, double *lambda) {
+    return kept_solve(l, b, c, x, lambda);
+}
+
 /* lambda eliminated from M x = b + G^T lambda (ME 6590, eq. 9):  with G N = 0,
  *
  *   N^T (M x - b) = 0 ,   G x = c ,
@@ -79,6 +85,7 @@ static int basis_unweighted(Linear *l, int *basis) {
 }
 
 static int basis(Linear *l, int *rows) {
+    if (l->rung == RUNG_KEPT) return kept_basis(l, rows);
     if (l->rung == RUNG_LEAST_NORM) return basis_unweighted(l, rows);
     const Weighted w = weighted_view(l);
     for (int j = w.cod.rank; j < w.acting; j++) rows[w.rows[w.cod.column[j]]] = 0;
@@ -92,5 +99,5 @@ static double apart(const Linear *l) {
     return last < 0 ? 1 : fabs(w.cod.A[last * w.cod.rows + last]);
 }
 
-static const Dependent ALL = {doubles, ints, factor_nullspace, factor_rows, solve_rows, basis, apart};
+static const Dependent ALL = {doubles, ints, keep_rows, solve_kept, factor_nullspace, factor_rows, solve_rows, basis, apart};
 SHARED_VALUE const Dependent *const DEPENDENT = &ALL;

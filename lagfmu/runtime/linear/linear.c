@@ -107,6 +107,10 @@ static Status too_large(const Linear *l) {
                 DENSE_MOST);
 }
 
+static void none_shared(Linear *l) {
+    for (int k = 0; k < l->system->m; k++) l->unique[k] = 1;
+}
+
 /* The rungs above the Schur complement. */
 static Status climb(Linear *l) {
     if (check_factored(l) != OK) return FAILED;
@@ -130,17 +134,27 @@ static Status factor_lists(Linear *l) {
     return safe && schur_of(l)->condition * loose(l) <= 1 ? OK : climb(l);
 }
 
-Status linear_factor(Linear *l, const double *M, const double *G, const int *active) {
+/* By rows that stand for all. */
+static int factor_kept(Linear *l, const int *basis) {
+    if (basis == NULL || l->dense == NULL || DEPENDENT == NULL) return 0;
+    if (DEPENDENT->keep(l, basis) && schur_of(l)->condition * loose(l) <= 1) {
+        l->rung = RUNG_KEPT;
+        return 1;
+    }
+    none_shared(l);
+    return 0;
+}
+
+Status linear_factor_kept(Linear *l, const double *M, const double *G, const int *active, const int *basis) {
     int all = 1;
     l->M = M;
     l->G = G;
     l->active = active;
     l->stiffened = 0;
-    for (int k = 0; k < l->system->m; k++) {
-        l->unique[k] = 1;
-        all &= active[k];
-    }
+    none_shared(l);
+    for (int k = 0; k < l->system->m; k++) all &= active[k];
     l->some = all ? NULL : active;
+    if (factor_kept(l, basis)) return OK;
     if (all && l->system->solve != NULL && !(l->off > 0)) {
         l->rung = RUNG_WRITTEN_OUT; /* it factors and solves at once */
         return OK;
@@ -149,6 +163,10 @@ Status linear_factor(Linear *l, const double *M, const double *G, const int *act
         DEPENDENT->nullspace(l))
         return OK;
     return factor_lists(l);
+}
+
+Status linear_factor(Linear *l, const double *M, const double *G, const int *active) {
+    return linear_factor_kept(l, M, G, active, NULL);
 }
 
 Status linear_contradicted(Linear *l) {
@@ -181,7 +199,13 @@ Status linear_solve(Linear *l, const double *b, const double *c, double *x, doub
     }
     if (l->stiffened) b = stiffened_forces(l, b, c);
     Status status = OK;
-    if (l->rung != RUNG_SCHUR) {
+    if (l->rung == RUNG_KEPT) {
+        if (!DEPENDENT->solve_kept(l, b, c, x, lambda)) {
+            none_shared(l);
+            if (check_right(l, b, c) != OK || climb(l) != OK) return FAILED;
+            status = solve_dense(l, b, c, x, lambda);
+        }
+    } else if (l->rung != RUNG_SCHUR) {
         status = solve_dense(l, b, c, x, lambda);
     } else if (!schur_solve(l, b, c, x, lambda)) {
         if (check_right(l, b, c) != OK || climb(l) != OK) return FAILED;
@@ -219,7 +243,7 @@ int linear_plain(const Linear *l) {
 
 int linear_basis(Linear *l, int *basis) {
     for (int k = 0; k < l->system->m; k++) basis[k] = l->active[k];
-    if (l->rung != RUNG_ORTHOGONAL && l->rung != RUNG_LEAST_NORM) return 0;
+    if (l->rung != RUNG_ORTHOGONAL && l->rung != RUNG_LEAST_NORM && l->rung != RUNG_KEPT) return 0;
     return DEPENDENT->basis(l, basis);
 }
 

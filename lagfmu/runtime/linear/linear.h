@@ -5,7 +5,8 @@
  *   1. schur.c       sparse Cholesky of the Schur complement, guarded by its condition estimate; where M
  *                    is singular, with constraints that hold it (stiffened.c)
  *   2. kkt.c         LU of the scaled KKT matrix, with refinement
- *   3. orthogonal.c  complete orthogonal decomposition weighted by M: dependent rows (dependent.h) */
+ *   3. orthogonal.c  complete orthogonal decomposition weighted by M: dependent rows (dependent.h); by the first
+ *                    where rows are known that stand for all (kept.c) */
 #ifndef LAGFMU_LINEAR_H
 #define LAGFMU_LINEAR_H
 
@@ -16,6 +17,7 @@
 
 typedef enum {
     RUNG_SCHUR, RUNG_KKT, RUNG_ORTHOGONAL, RUNG_LEAST_NORM, RUNG_NULLSPACE,
+    RUNG_KEPT,       /* dependent rows, by those that stand for all */
     RUNG_WRITTEN_OUT /* the first, as system->solve */
 } Rung;
 
@@ -54,6 +56,10 @@ SHARED void linear_layout(Linear *l, Arena *arena, const System *s, Why *why);
 /* Factors for the rows in `active`.  FAILED, with the cause in `why`: a value is not finite, or the
  * mass matrix is singular on the constraint surface. */
 SHARED Status linear_factor(Linear *l, const double *M, const double *G, const int *active);
+
+/* The same, where rows are known to depend on each other and `basis` (m; NULL: not known) to stand for all: what the
+ * decomposition of all would find, for a fraction of its cost. */
+SHARED Status linear_factor_kept(Linear *l, const double *M, const double *G, const int *active, const int *basis);
 
 /* x (nv) and lambda (m; 0 where a row does not act).  c is read where rows act; b may be NULL (zero).
  * lambda may be NULL.  FAILED: dependent rows contradict each other, or the result overflows. */

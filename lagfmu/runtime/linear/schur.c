@@ -141,7 +141,7 @@ static void assemble(const Plan *plan, Schur *own, const int *acts) {
     const double *w = own->w, *h = own->h;
     for (int p = 0; p < e->size; p++) {
         const int there = acts == NULL || acts[e->order[p]];
-        own->inverse[p] = own->diagonal[e->order[p]];
+        own->inverse[p] = there ? own->diagonal[e->order[p]] : 1;
         for (int k = e->start[p]; k < e->start[p + 1]; k++) {
             double sum = 0;
             if (there && (acts == NULL || acts[e->order[e->column[k]]]))
@@ -216,7 +216,7 @@ void schur_back(const Linear *l, double *y, double *x) {
     for (int p = 0; p < e->size; p++) x[e->order[p]] = y[p];
 }
 
-/* y <- y + D^-1 W lambda with W^T y = c on the rows that act. */
+/* y <- y + D^-1 W lambda with W^T y = c (NULL: 0) on the rows that act. */
 static void constrain(const Linear *l, const double *c, double *y, double *lambda) {
     const Schur *own = schur_of(l);
     const Elimination *e = &l->system->plan->schur;
@@ -226,7 +226,7 @@ static void constrain(const Linear *l, const double *c, double *y, double *lambd
         int k = e->order[p];
         z[p] = 0;
         if (!l->active[k]) continue;
-        double sum = c[k];
+        double sum = c != NULL ? c[k] : 0;
         for (int a = start[k], to = start[k + 1]; a < to; a++) sum -= own->w[a] * y[column[a]];
         for (int a = e->start[p], to = e->start[p + 1]; a < to; a++) sum -= own->lower[a] * z[e->column[a]];
         z[p] = sum;
@@ -240,6 +240,19 @@ static void constrain(const Linear *l, const double *c, double *y, double *lambd
         for (int a = e->start[p], to = e->start[p + 1]; a < to; a++) z[e->column[a]] -= own->lower[a] * known;
         for (int a = start[k], to = start[k + 1]; a < to; a++) y[column[a]] += own->h[a] * known;
     }
+}
+
+void schur_begin_row(const Linear *l, int k, double *y) {
+    const Schur *own = schur_of(l);
+    for (int i = 0; i < l->system->nv; i++) y[i] = 0;
+    for (int a = own->w_start[k]; a < own->w_start[k + 1]; a++) y[own->w_column[a]] = own->h[a];
+}
+
+void schur_express(Linear *l, double *y, double *lambda) {
+    const int *active = l->active;
+    l->active = l->some;
+    constrain(l, NULL, y, lambda);
+    l->active = active;
 }
 
 static void substitute_schur(Linear *l, const double *b, const double *c, double *x, double *lambda) {

@@ -51,6 +51,11 @@ SHARED int schur_factor(Linear *l);
 SHARED void schur_half(const Linear *l, const double *b, double *y);
 SHARED void schur_back(const Linear *l, double *y, double *x);
 
+/* y (nv) <- D^-1 L^-1 P g_k^T of a row that acts; then that less what the rows of l->some make of it, in the metric of M:
+ * lambda (m; 0 elsewhere) is what has to be added of each. */
+SHARED void schur_begin_row(const Linear *l, int k, double *y);
+SHARED void schur_express(Linear *l, double *y, double *lambda);
+
 /* x and lambda (not NULL), refined as the trust asks for.  0 if the refinement does not settle. */
 SHARED int schur_solve(Linear *l, const double *b, const double *c, double *x, double *lambda);
 

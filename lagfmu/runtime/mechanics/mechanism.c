@@ -105,19 +105,25 @@ static Status motion_given(Mechanism *b) {
     return OK;
 }
 
-Status mechanism_motion(Mechanism *b, Instant at, const double *q, const double *v,
-                        const int *active) {
-    evaluate_functions(b, at, q, v);
+/* Where the functions have been evaluated; `basis`: see linear_factor_kept(). */
+static Status motion_evaluated(Mechanism *b, Instant at, const double *q, const double *v, const int *active,
+                               const int *basis) {
     if (b->given != NULL) {
         if (motion_given(b) == OK && (b->sliding == NULL || b->sliding->given(b, at, q, v, active) == OK)) return OK;
     } else if (b->sliding != NULL) {
         if (b->sliding->motion(b, at, q, v, active) == OK) return OK;
-    } else if (linear_factor(&b->linear, b->M, b->G, active) == OK &&
+    } else if (linear_factor_kept(&b->linear, b->M, b->G, active, basis) == OK &&
                linear_solve(&b->linear, b->F, b->gamma, b->vdot, b->lambda) == OK) {
         return OK; /* linear.h: what it solves is finite */
     }
     (void)check_values(b, at); /* the cause, if it is the equations */
     return FAILED;
+}
+
+Status mechanism_motion(Mechanism *b, Instant at, const double *q, const double *v,
+                        const int *active) {
+    evaluate_functions(b, at, q, v);
+    return motion_evaluated(b, at, q, v, active, NULL);
 }
 
 /* b->vdot leaves nothing of the rows that stand in no basis. */
@@ -196,7 +202,7 @@ Status mechanism_motion_near(Mechanism *b, Instant at, const double *q, const do
     if (mechanism_evaluate(b, at, q, v) != OK) return FAILED;
     if (find_off(b, at, q, active, offset, span, &off) != OK) return FAILED;
     b->linear.off = off;
-    const Status status = mechanism_motion(b, at, q, v, active);
+    const Status status = motion_evaluated(b, at, q, v, active, b->basis);
     b->linear.off = 0;
     return status;
 }

@@ -196,8 +196,7 @@ Status solver_observe(Solver *s, Observed *o) {
     const System *full = system_read(s->system);
     Mechanism *b = s->system->embed != NULL ? &s->full : &s->stepped;
     const Instant at = segment_instant(s, s->state.now.t);
-    system_active(s->system, s->state.closed, s->active);
-    s->stepped.dependent = s->state.now.dependent;
+    segment_begin(s);
     if (s->system->embed != NULL && observe_stepped(s, at, o) == FAILED) return FAILED;
     expand(s, at.t, s->state.q, s->state.v, o->q, o->v);
     if (full->dynamics != NULL && observe_solved(s, at, b, o) == FAILED) return FAILED;
