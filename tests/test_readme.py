@@ -242,6 +242,22 @@ def test_links_of_the_pages_lead_somewhere():
             assert "://" in link or (page.parent / link).exists(), (page.name, link)
 
 
+def headings(page: Path) -> set[str]:
+    """The anchors of a page that are the same on a forge and on the site, whose anchors are ASCII."""
+    found = re.findall(r"^##+ (.+)$", page.read_text(encoding="utf-8"), re.MULTILINE)
+    words = (re.sub(r"[^\w\s-]", "", text.lower()).split() for text in found)
+    return {"-".join(w) for w in words if "".join(w).isascii()}
+
+
+def test_links_into_pages_lead_to_headings():
+    """On a forge and on the site."""
+    for page in [REPOSITORY / "README.md", *PAGES, *LESSONS]:
+        text = page.read_text(encoding="utf-8")
+        for file, anchor in re.findall(r"\]\(([^)#:]*)#([^)\s]+)\)", text):
+            at = page.parent / file if file else page
+            assert anchor in headings(at), (page.name, file, anchor)
+
+
 def test_the_readme_tells_every_extra_and_no_message_names_an_index() -> None:
     """lagfmu is installed from a clone: pip knows `.[study]` there, and `lagfmu[study]` nowhere."""
     project = tomllib.loads((REPOSITORY / "pyproject.toml").read_text(encoding="utf-8"))["project"]

@@ -62,7 +62,7 @@ def as_text(value: Any, digits: int = 6) -> str:
 
 
 class Result(np.ndarray):  # type: ignore[type-arg]
-    """A row a communication point: result["time"] [s], result["lambda.rod"], ...
+    """A row a communication point: `result["time"]` in s, `result["lambda.rod"]`, ...
 
     `units` maps the columns to their units, `name` is the FMU's or the scene's, `target` what has run: native
     or python.  A column is a plain array.
