@@ -14,7 +14,7 @@ in that of the same FMU without error bars (median ratio of interleaved runs).  
 quantity and by the index of the communication point, the part of the runs in which none of these was missed.
 
 --drawn N takes systems drawn at random instead (drawn_systems.py), on which the bars are calibrated
-(runtime/fmi/bars.c); --quick takes four runs of each scene and no cost; --misses N names the worst N.
+(runtime/fmi/error_bars.c); --quick takes four runs of each scene and no cost; --misses N names the worst N.
 """
 
 from __future__ import annotations

@@ -142,10 +142,10 @@ from .studio.sweep.design import from_file as rows_from
 from .studio.sweep.process import SessionProcess
 from .studio.sweep.results import Parts, PartWarning, happened, read_rows
 from .studio.tradeoff.choose import choose, other_values
+from .studio.tradeoff.converged import OWN, Setting, observe, opened, quantities, refer
 from .studio.tradeoff.measure import Plan as TradeoffPlan
 from .studio.tradeoff.measure import Point, Tradeoff, measure
 from .studio.tradeoff.measure import table as tradeoff_table
-from .studio.tradeoff.reference import OWN, Setting, observe, opened, quantities, refer
 from .verification import pipeline
 from .verification.closed_forms import applies, check_closed_form, landed
 from .verification.laws import CarriedLaws

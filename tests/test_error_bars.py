@@ -151,8 +151,8 @@ def test_a_run_is_the_same_with_error_bars_and_without(barred, native_fmu):
     for name in without.dtype.names:
         assert np.array_equal(with_bars[name], without[name]), name
     assert not any(n.startswith("error.") for n in without.dtype.names)
-    assert "bars.c" in sources(barred("Hemisphere"))
-    assert "bars.c" not in sources(native_fmu("Hemisphere"))
+    assert "error_bars.c" in sources(barred("Hemisphere"))
+    assert "error_bars.c" not in sources(native_fmu("Hemisphere"))
     with pytest.raises(SimulationError, match="--error-bars"):
         simulate(native_fmu("Hemisphere"), error_bars=True)
 

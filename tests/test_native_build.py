@@ -152,7 +152,7 @@ def test_the_sources_are_those_that_the_binary_is_made_of(native_fmu):
         assert runtime[name] == RUNTIME_FILES[name].read_bytes(), name
     own = [name for name in files if name.endswith(".c") and name != "all.c"]
     assert {*reached(files, own)} == files.keys() - {"all.c"}
-    gone = {"kinematics", "sliding", "stick_slip", "bars", "switches", "variation", "rattle"}
+    gone = {"kinematics", "sliding", "stick_slip", "error_bars", "switches", "variation", "rattle"}
     assert not gone & {Path(name).stem for name in own}
     again = bundled(runtime, {name: files[name] for name in files.keys() - runtime.keys()})
     assert unbundled(again) == files

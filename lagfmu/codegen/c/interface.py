@@ -33,7 +33,7 @@ VARIABLES = """/* variables.c -- {name}: the variables of the FMU, in the order 
 #include <stddef.h>
 
 #include "algebraic.h"
-#include "bars.h"
+#include "error_bars.h"
 #include "derivatives.h"
 #include "identity.h"
 #include "prescribed.h"

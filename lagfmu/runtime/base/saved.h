@@ -1,5 +1,5 @@
 /* saved.h -- what a saved state remembers: each number is a row of a table beside what it belongs to, and from the row come
- * its member, its memory (layout.c), and what it may be when it comes back from outside (restored.c).
+ * its member, its memory (layout.c), and what it may be when it comes back from outside (saved_check.c).
  *
  * Of a number: N(type, member, SORT, what a refusal calls it).  Of an array: A(type, member, how many, SORT, name).
  * SORT: FLAG 0 or 1; COUNT, TALLY of int, Count; SIZE 0 or more; LIMIT, and maybe infinite; FINITE any finite double;

@@ -5,7 +5,7 @@
 #ifndef LAGFMU_INSTANCE_H
 #define LAGFMU_INSTANCE_H
 
-#include "bars.h"
+#include "error_bars.h"
 #include "linkage.h"
 #include "rates.h"
 #include "sensitivity.h"
@@ -208,7 +208,7 @@ SHARED size_t instance_record_size(const Instance *x);
 SHARED void instance_save(Instance *x, char *record);
 SHARED void instance_restore(Instance *x, const char *record);
 
-/* Is what was read from a saved state a state that this FMU can be in (restored.c)?
+/* Is what was read from a saved state a state that this FMU can be in (saved_check.c)?
  * Looks at everything that instance_restore() has just put into the instance.  FAILED: it is no state
  * of this FMU, the cause is in x->solver.why; nothing of it must be used. */
 SHARED Status instance_restored(Instance *x);

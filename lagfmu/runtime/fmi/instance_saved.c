@@ -1,4 +1,4 @@
-/* instance_saved.c -- saved states of an instance (restored.c: is what was read from one a state?). */
+/* instance_saved.c -- saved states of an instance (saved_check.c: is what was read from one a state?). */
 #include "instance.h"
 
 #include <string.h>

@@ -55,7 +55,7 @@ typedef enum {
     AT_CLOCK,          /* of contact, or after those friction, index */
     AT_SENSITIVITY,    /* derivative of the variable at position `index` by what column `contact` is taken by */
     AT_SENSITIVITY_VALID,
-    AT_ERROR           /* error bar number `contact`, of the variable at position `index` (bars.h) */
+    AT_ERROR           /* error bar number `contact`, of the variable at position `index` (error_bars.h) */
 } Place;
 
 static inline double minus_sum(const double *x, int count) {

@@ -56,7 +56,7 @@ typedef struct Solver {
     int on_demand;             /* 1: q and v between two steps are found when the caller asks: solver_arrive() */
     Halt halt;
     Caller caller;
-    double limit;              /* [s] of a step, of the finer run of error bars (bars.h); 0: none */
+    double limit;              /* [s] of a step, of the finer run of error bars (error_bars.h); 0: none */
     double first, taken;       /* [s] the first and the longest step that led to the communication point */
     State state;
     Drive drive;

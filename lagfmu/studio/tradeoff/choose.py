@@ -26,7 +26,7 @@ from ...model.scene import HELD_OUT_MARGIN, MARGIN, Goal, Scene
 from ...page.documentation import template
 from ...prepare.prepare import prepare
 from ...verification.simulate import steps_of
-from .reference import Reference, Setting, ladder, observe, opened, refer, selected, wider
+from .converged import Reference, Setting, ladder, observe, opened, refer, selected, wider
 
 SHARE = 0.05  # of a value, or of its largest magnitude in the scene where all start values are zero
 CASES = 3

@@ -37,7 +37,7 @@ from ...verification.pipeline import Case, Report
 from ...verification.simulate import steps_of
 from ...verification.verify import closed_forms_in
 from .choose import Tick
-from .reference import (
+from .converged import (
     FINER,
     GROUPS,
     HALVINGS,

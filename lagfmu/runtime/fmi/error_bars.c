@@ -1,9 +1,9 @@
-/* bars.c -- error bars by a finer run; see bars.h.
+/* error_bars.c -- error bars by a finer run; see error_bars.h.
  *
  * Events pair by their count: while one of the runs has met an event that the other has not, a difference
  * says nothing and the bar is infinite, for which the largest double stands.  Beside a method of fixed
  * steps the finer run takes twice as many. */
-#include "bars.h"
+#include "error_bars.h"
 
 #include <float.h>
 #include <math.h>
@@ -17,7 +17,7 @@
 #include "segment.h"
 
 static const double INFINITE = DBL_MAX;
-/* Of bars.h; MARGIN, SPREAD, ESTIMATE and ROUNDING are calibrated: benchmarks/error_bars.py --drawn. */
+/* Of error_bars.h; MARGIN, SPREAD, ESTIMATE and ROUNDING are calibrated: benchmarks/error_bars.py --drawn. */
 static const double FINER = 0.1;    /* the finer run's tolerance, in that of the delivered run */
 static const double SHORTER = 0.7;  /* its first and its longest step, in the delivered run's */
 static const double MARGIN = 6, SPREAD = 0.03, ESTIMATE = 2, BAR_ROUNDING = 16;

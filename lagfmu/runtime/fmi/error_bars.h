@@ -1,4 +1,4 @@
-/* bars.h -- error bars: how far the values of this run may be off, estimated by a finer run beside it.
+/* error_bars.h -- error bars: how far the values of this run may be off, estimated by a finer run beside it.
  *
  * The finer run steps the same equations from the same consistent start under the same inputs, at the
  * tolerance FINER tol, with steps no longer than SHORTER times the delivered one's longest.  With x of the
@@ -14,8 +14,8 @@
  * (docs/error_bars.md).
  *
  * All of it is reached by one pointer, NULL in an FMU without error bars. */
-#ifndef LAGFMU_BARS_H
-#define LAGFMU_BARS_H
+#ifndef LAGFMU_ERROR_BARS_H
+#define LAGFMU_ERROR_BARS_H
 
 #include "linkage.h"
 #include "solver.h"

@@ -1,4 +1,4 @@
-/* restored.c -- is what was read from a saved state a state that this FMU can be in?
+/* saved_check.c -- is what was read from a saved state a state that this FMU can be in?
  *
  * Bytes come from a file, or from anyone.  A checksum tells altered bytes, not forged ones: an index, a
  * count, a mode or a time that no simulation has would be followed blindly.  So each number has a range,
