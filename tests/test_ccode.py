@@ -21,6 +21,7 @@ from conftest import FILES
 from runtime import FLAGS, INCLUDES, RUNTIME_FILES, compile_library, compiler
 from sympy.physics.mechanics import dynamicsymbols
 from zoo import point_mass
+from zoo.pendulums import chain
 
 from lagfmu import (
     Contact,
@@ -716,25 +717,6 @@ def test_a_system_without_constraints(tmp_path: Path) -> None:
 # --------------------------------------------------------------------------------- large models
 
 
-def chain(n: int) -> Model:
-    """n point masses, each tied to the one before it by a rod of length L."""
-    xs, ys = dynamicsymbols(f"x1:{n + 1}"), dynamicsymbols(f"y1:{n + 1}")
-    m, g, L = sp.symbols("m g L", positive=True)
-    pairs = list(zip(xs, ys, strict=True))
-    kinetic = sp.Add(*(m * (a.diff() ** 2 + b.diff() ** 2) / 2 for a, b in pairs))
-    ends = zip([(0, 0), *pairs[:-1]], pairs, strict=True)
-    return Model(
-        name=f"Chain{n}",
-        lagrangian=kinetic - sp.Add(*(m * g * b for b in ys)),
-        coordinates=dict.fromkeys((*xs, *ys), "m"),
-        constraints=[
-            Holonomic(f"rod{j}", (b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 - L**2)
-            for j, (a, b) in enumerate(ends)
-        ],
-        parameters=[Parameter(m, 1, "kg"), Parameter(g, 9.81, "m/s^2"), Parameter(L, 1, "m")],
-    )
-
-
 def bodies(text: str) -> list[int]:
     """Statements of each function."""
     found = re.findall(r"^static void \w+\([^{]*\) \{\n(.*?)^\}", text, re.DOTALL | re.MULTILINE)
@@ -743,7 +725,7 @@ def bodies(text: str) -> list[int]:
 
 def test_code_grows_linearly_and_in_blocks(tmp_path: Path) -> None:
     """Twice the links, twice the text; and no function grows beyond a bounded block."""
-    half, whole = (model_source(Form(derive(chain(n)))) for n in (16, 32))
+    half, whole = (model_source(Form(derive(chain(n, "Chain", "rod")))) for n in (16, 32))
     assert len(whole) < 2.1 * len(half)
     assert sum(bodies(whole)) < 2.1 * sum(bodies(half))
     assert len(bodies(whole)) > len(bodies(half))

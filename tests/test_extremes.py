@@ -9,6 +9,7 @@ import re
 from collections.abc import Sequence
 from ctypes import c_double, c_size_t
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +29,7 @@ from sympy import cos, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 from zoo import point_mass
 from zoo.linkages import four_points, isosceles, parallelogram
+from zoo.pendulums import ROD, pendulum
 
 from lagfmu import Holonomic, Input, Model, Parameter, names, simulate
 
@@ -305,18 +307,9 @@ def test_a_motion_is_as_quick_as_doubles_can_say(built):
 # ---------------------------------------------------------------------------- dependent constraints
 
 
-def bob(name: str, constraints: Sequence[Holonomic], **changes: Any) -> Model:
-    """A pendulum in the plane, held by the given constraints."""
-    fields = {
-        "lagrangian": m * (x.diff() ** 2 + y.diff() ** 2) / 2 - m * g * y,
-        "coordinates": {x: "m", y: "m"},
-        "parameters": [Parameter(m, 2.0, "kg"), Parameter(g, g0, "m/s^2"), Parameter(L, 1.25, "m")],
-        "start": {x: 0.75, y: -1.0, x.diff(): 1.0, y.diff(): 0.75},
-    }
-    return Model(name=name, constraints=constraints, **(fields | changes))
-
-
-ROD = x**2 + y**2 - L**2
+bob = partial(  # held by the given constraints
+    pendulum, mass=2.0, length=1.25, start={x: 0.75, y: -1.0, x.diff(): 1.0, y.diff(): 0.75}
+)
 
 
 @pytest.mark.parametrize(

@@ -10,10 +10,9 @@ import sys
 import fmpy
 import pytest
 from instance import instance
-from sympy import cos, symbols
-from sympy.physics.mechanics import dynamicsymbols
+from zoo.pendulums import on_hemisphere
 
-from lagfmu import Contact, Model, Parameter, Scene, build_fmu
+from lagfmu import Scene, build_fmu
 
 STEP = 0.05
 
@@ -84,20 +83,6 @@ def test_the_state_of_another_fmu_is_refused(fmu):
         assert any("belongs to another FMU" in message for _, _, message in one.log)
 
 
-def particle(name: str, factor: float) -> Model:
-    r, theta = dynamicsymbols("r theta")
-    m, g, a = symbols("m g a", positive=True)
-    kinetic = m * (r.diff() ** 2 + r**2 * theta.diff() ** 2) / 2
-    return Model(
-        name=name,
-        lagrangian=kinetic - factor * m * g * r * cos(theta),
-        coordinates={r: "m", theta: "rad"},
-        constraints=[Contact("surface", r - a)],
-        parameters=[Parameter(m, 1, "kg"), Parameter(g, 9.81, "m/s^2"), Parameter(a, 1, "m")],
-        start={r: 1.0, theta: 0.1},
-    )
-
-
 def test_two_versions_with_one_file_name_are_both_right(tmp_path):
     """lambda at the top is m g cos(theta0), then 2 m g cos(theta0) in doubled gravity: two FMUs of the
     same name in one process do not serve each other's equations."""
@@ -105,7 +90,10 @@ def test_two_versions_with_one_file_name_are_both_right(tmp_path):
     for factor in (1.0, 2.0):
         paths.append(
             build_fmu(
-                particle("Same", factor), tmp_path / f"v{factor:g}", Scene("Same"), check=False
+                on_hemisphere("Same", 0.1, weight=factor),
+                tmp_path / f"v{factor:g}",
+                Scene("Same"),
+                check=False,
             )
         )
     weights = []

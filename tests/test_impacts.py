@@ -14,9 +14,10 @@ from runs import simulate_fmu
 from sympy import cos, symbols
 from sympy.physics.mechanics import dynamicsymbols
 from zoo import point_mass
-from zoo.contacts import G, corner, cradle, e, m, restitution, rod, table, wedge
+from zoo.contacts import G, corner, cradle, e, restitution, rod, table, wedge
+from zoo.pendulums import on_hemisphere, r, theta
 
-from lagfmu import Contact, Model, Parameter, simulate
+from lagfmu import Contact, Parameter, simulate
 from lagfmu.errors import LagfmuError
 
 pytestmark = pytest.mark.filterwarnings("ignore:.*follows? from the others")
@@ -241,32 +242,20 @@ def test_a_fixed_step_carries_no_ball_through_the_floor(native_fmu, step):
         assert result["y"][-1] >= 0
 
 
-def lander() -> Model:
-    """A particle that slides down a hemisphere and lands on the floor around it."""
-    r, theta = dynamicsymbols("r theta")
-    a, g = symbols("a g", positive=True)
-    return Model(
-        name="Lander",
-        lagrangian=m * (r.diff() ** 2 + r**2 * theta.diff() ** 2) / 2 - m * g * r * cos(theta),
-        coordinates={r: "m", theta: "rad"},
-        constraints=[Contact("surface", r - a), Contact("floor", r * cos(theta), restitution=e)],
-        parameters=[
-            Parameter(m, 1.0, "kg"),
-            Parameter(g, G, "m/s^2"),
-            Parameter(a, 1.0, "m"),
-            restitution(0.5),
-        ],
-        start={r: 1.0, theta: 0.1},
-    )
-
-
 @pytest.mark.parametrize("value", [0.0, 0.5, 0.9])
 def test_a_particle_that_left_a_hemisphere_lands_in_model_exchange(built, value):
     """It leaves at cos theta = (2/3) cos theta0, lands on the floor and stays above it for 6 s, whatever
     tolerance CVODE has; x'' = 0 and energy only falls after the departure, within the tolerance."""
+    floor = Contact("floor", r * cos(theta), restitution=e)
+    lander = built(on_hemisphere("Lander", 0.1, [floor], parameters=[restitution(0.5)]))
     for tolerance in TOLERANCES:
         values = {"e": value}
-        result = exchanged(built(lander()), 6.0, relative_tolerance=tolerance, start_values=values)
+        result = exchanged(
+            lander,
+            6.0,
+            relative_tolerance=tolerance,
+            start_values=values,
+        )
         height = result["r"] * np.cos(result["theta"])
         assert height.min() >= -1e-5
         assert result["r"].min() >= 1 - 1e-3

@@ -18,12 +18,12 @@ from sympy import Matrix, Rational, cos, diff, sin, symbols
 from sympy.physics.mechanics import dynamicsymbols
 from typer.testing import CliRunner
 from zoo import point_mass, whipple
+from zoo.pendulums import chain
 
 import lagfmu
 from lagfmu import (
     Contact,
     Friction,
-    Holonomic,
     Linearization,
     Model,
     Nonholonomic,
@@ -134,35 +134,12 @@ def test_half_a_car_bounces_and_pitches_on_its_wheels(native_fmu):
 def test_a_hanging_chain_has_the_zeros_of_a_laguerre_polynomial(n):
     """n equal beads on n equal massless links: omega^2 = (g/L) x with L_n(x) = 0, for n -> oo the zeros of
     Bessel's J0 (Daniel Bernoulli): omega_1 = j_01/2 sqrt(g/(n L))."""
-    model = chain(n)
+    model = hanging(n)
     start = {f"x{k}": 0.02 * k for k in range(1, n + 1)}
     found = linearize(model, equilibrium=True, start_values=start)
     x, _ = roots_laguerre(n)
     assert frequencies(found) == pytest.approx(np.sqrt(G / 0.5 * x), rel=1e-9)
     assert not found.poles.zeros
-
-
-def chain(n: int) -> Model:
-    """Beads of 2 kg on links of 0.5 m, x to the right, y up."""
-    x, y = dynamicsymbols(f"x1:{n + 1}"), dynamicsymbols(f"y1:{n + 1}")
-    L = symbols("L", positive=True)
-    ends = [(0, 0), *zip(x, y, strict=True)]
-    return Model(
-        "HangingChain",
-        lagrangian=sum(
-            m * (p.diff() ** 2 + q.diff() ** 2) / 2 - m * g * q for p, q in zip(x, y, strict=True)
-        ),
-        coordinates=dict.fromkeys([*x, *y], "m"),
-        constraints=[
-            Holonomic(
-                f"link{k}",
-                (ends[k][0] - ends[k - 1][0]) ** 2 + (ends[k][1] - ends[k - 1][1]) ** 2 - L**2,
-            )
-            for k in range(1, n + 1)
-        ],
-        parameters=[MASS, GRAVITY, Parameter(L, 0.5, "m")],
-        start=dict.fromkeys(x, 0.0) | {q: -0.5 * k for k, q in enumerate(y, 1)},
-    )
 
 
 def test_a_rolling_disc_weaves_at_speed():
@@ -176,6 +153,13 @@ def test_a_rolling_disc_weaves_at_speed():
     is_close(found, [1j * math.sqrt(-square), -1j * math.sqrt(-square)])
     assert (len(found.states), found.poles.zeros) == (8, 6)
     assert found.drift < 1e-6
+
+
+def hanging(n: int) -> Model:
+    """Beads of 2 kg on links of 0.5 m, x to the right, y up."""
+    start = {f"x{k}": 0.0 for k in range(1, n + 1)} | {f"y{k}": -0.5 * k for k in range(1, n + 1)}
+    at = {dynamicsymbols(name): value for name, value in start.items()}
+    return chain(n, "HangingChain", mass=2.0, length=0.5, start=at)
 
 
 def disc() -> Model:

@@ -20,6 +20,7 @@ from sympy.physics.mechanics import (
     dynamicsymbols,
 )
 from zoo import point_mass
+from zoo.pendulums import chain
 
 from lagfmu import (
     Contact,
@@ -366,28 +367,16 @@ def test_a_start_at_rest_is_set_in_motion_by_its_constraints():
 # ---------------------------------------------------------------------------- sparsity
 
 
-def chain(n: int) -> Model:
-    """n masses on n rods, in absolute coordinates."""
-    xs, ys = dynamicsymbols(f"x:{n}"), dynamicsymbols(f"y:{n}")
-    lagrangian, rods = sp.S.Zero, []
-    for k in range(n):
-        lagrangian += m * (xs[k].diff() ** 2 + ys[k].diff() ** 2) / 2 - m * g * ys[k]
-        a, b = (xs[k - 1], ys[k - 1]) if k else (0, 0)
-        rods.append(Holonomic(f"rod{k}", (xs[k] - a) ** 2 + (ys[k] - b) ** 2 - L**2))
-    return Model(
-        name="Chain",
-        lagrangian=lagrangian,
-        coordinates=dict.fromkeys((*xs, *ys), "m"),
-        constraints=rods,
-        parameters=CONSTANTS,
-        start={s: 1.5 * (k + 1) for k, s in enumerate(xs)},
-    )
+def hanging(n: int) -> Model:
+    """n masses on n rods, stretched out."""
+    start = {dynamicsymbols(f"x{k}"): 1.5 * (k + 1) for k in range(n)}
+    return chain(n, "Chain", "rod", first=0, mass=2.0, length=1.5, start=start)
 
 
 def test_a_chains_matrices_are_sparse():
     """M is diagonal and each rod touches two masses: 2 n and 4 n - 2 entries, nothing else stored."""
     n = 20
-    eom = derive(chain(n))
+    eom = derive(hanging(n))
     assert len(eom.M.todok()) == 2 * n
     assert len(eom.G.todok()) == 4 * n - 2
     assert all(len(f.free_symbols) <= 2 for f in eom.F)
@@ -396,7 +385,7 @@ def test_a_chains_matrices_are_sparse():
 
 def test_a_horizontal_chain_starts_in_free_fall():
     """All rods horizontal and at rest: they carry nothing, every mass falls with g."""
-    run = observed(chain(5))
+    run = observed(hanging(5))
     assert [run[f"der(y{k},2)"] for k in range(5)] == pytest.approx([-9.81] * 5, rel=1e-9)
     assert [run[f"lambda.rod{k}"] for k in range(5)] == pytest.approx([0.0] * 5, abs=1e-9)
 

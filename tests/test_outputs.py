@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import fmpy
 import numpy as np
@@ -11,6 +12,7 @@ from instance import instance
 from runs import simulate_fmu
 from sympy import Abs, cos, log, sin, sqrt, symbols
 from sympy.physics.mechanics import dynamicsymbols
+from zoo.pendulums import on_hemisphere, pendulum
 
 from lagfmu import (
     Contact,
@@ -32,39 +34,14 @@ from lagfmu.testing import documentation_page as page
 
 t = dynamicsymbols._t
 x, y, r, theta, F = dynamicsymbols("x y r theta F")
-m, g, L, a = symbols("m g L a", positive=True)
+m, g, L = symbols("m g L", positive=True)
 CONSTANTS = (Parameter(m, 2.0, "kg"), Parameter(g, 9.81, "m/s^2"), Parameter(L, 1.5, "m"))
 
 
-def pendulum(**changes) -> Model:
-    """A bob on a rod of length L, in x and y; the rod's multiplier is -tension/(2 L)."""
-    fields = {
-        "name": "Pendulum",
-        "lagrangian": m * (x.diff() ** 2 + y.diff() ** 2) / 2 - m * g * y,
-        "coordinates": {x: "m", y: "m"},
-        "constraints": [Holonomic("rod", x**2 + y**2 - L**2)],
-        "parameters": CONSTANTS,
-        "start": {x: 0.9, y: -1.2},
-    }
-    return Model(**(fields | changes))
-
-
+swing = partial(pendulum, mass=2.0, length=1.5, start={x: 0.9, y: -1.2})
 TENSION = Output("tension", -2 * L * multiplier("rod"), "N", "pull of the rod on the bob")
 HEIGHT = Output("bob.height", y + L, "m")
 SPEED = Output("bob.speed", sqrt(x.diff() ** 2 + y.diff() ** 2), "m/s")
-
-
-def hemisphere(*outputs: Output) -> Model:
-    """A particle that slides from the top of a hemisphere and leaves it at cos(theta) = 2/3."""
-    return Model(
-        name="Dome",
-        lagrangian=m * (r.diff() ** 2 + r**2 * theta.diff() ** 2) / 2 - m * g * r * cos(theta),
-        coordinates={r: "m", theta: "rad"},
-        constraints=[Contact("surface", r - a)],
-        parameters=(*CONSTANTS[:2], Parameter(a, 1.0, "m")),
-        start={r: 1.0, theta: 0.3},
-        outputs=outputs,
-    )
 
 
 # ---------------------------------------------------------------------------- values
@@ -79,7 +56,7 @@ def test_the_tension_carries_the_weight_and_turns_the_bob(formulation):
         Output("felt", m * sqrt(x.diff(t, 2) ** 2 + (y.diff(t, 2) + g) ** 2), "N"),
     ]
     embedding = Embedding({theta: "rad"}, {x: L * sin(theta), y: -L * cos(theta)}, {theta: 0.6})
-    model = pendulum(outputs=outputs, embedding=embedding)
+    model = swing(outputs=outputs, embedding=embedding)
     run = simulate(model, 0.5, 0.1, scene=Scene("P", formulation))
     square = run["der(x)"] ** 2 + run["der(y)"] ** 2
     expected = 2.0 * (square - 9.81 * run["y"]) / 1.5
@@ -91,7 +68,7 @@ def test_an_output_alone_is_what_it_is_among_all(native_fmu, tmp_path):
     """A scene of the tension, or of the height, keeps only what they need, and their values."""
     whole = simulate(native_fmu("PendulumCartesian"), 1.0)
     description = fmpy.read_model_description(str(native_fmu("PendulumCartesian")))
-    model = pendulum(
+    model = swing(
         outputs=[TENSION, HEIGHT],
         parameters=[replace(p, value=v) for p, v in zip(CONSTANTS, (1.0, 9.81, 1.0), strict=True)],
         start={x: np.sin(1.0), y: -np.cos(1.0)},
@@ -135,7 +112,7 @@ def test_an_output_of_ones_own_is_read_as_any_other(native_fmu):
 def test_what_needs_no_lambda_needs_no_solution_for_it():
     """The speed and the height of the bob are read of theta alone: no multiplier is solved for."""
     embedding = Embedding({theta: "rad"}, {x: L * sin(theta), y: -L * cos(theta)}, {theta: 0.6})
-    model = pendulum(outputs=[TENSION, HEIGHT, SPEED], embedding=embedding)
+    model = swing(outputs=[TENSION, HEIGHT, SPEED], embedding=embedding)
     made = prepare(model, Scene("Height", outputs=["bob.height", "bob.speed"]))
     assert made.formulation == "minimal"
     assert made.coded.equations.bare
@@ -148,7 +125,7 @@ def test_what_needs_no_lambda_needs_no_solution_for_it():
 def test_a_quotient_has_another_value_where_it_has_none(target, tmp_path):
     """Tangential over normal force, 0 in flight: finite on both sides of the departure."""
     weight = Output("slope", m * g * sin(theta) / multiplier("surface"), "1", otherwise=-1)
-    model = hemisphere(weight)
+    model = on_hemisphere("Dome", 0.3, mass=2.0, outputs=(weight,))
     run = simulate(build_fmu(model, tmp_path, Scene("Dome", step_size=0.05), target=target), 1.0)
     closed = run["contact.surface"]
     assert closed[0]
@@ -165,7 +142,7 @@ HEADING = Output("heading", x.diff() / SPEED.expression, "1")
 def test_a_value_that_is_none_is_refused_by_name(target, tmp_path):
     """The direction of a bob that is brought to rest: 0/0, told with the output and the remedy."""
     moving = {x: 0.9, y: -1.2, x.diff(): 0.8, y.diff(): 0.6}
-    path = build_fmu(pendulum(outputs=[HEADING], start=moving), tmp_path, target=target)
+    path = build_fmu(swing(outputs=[HEADING], start=moving), tmp_path, target=target)
     assert simulate(path, 0.1)["heading"][0] == pytest.approx(0.8, rel=1e-12)
     with pytest.raises(SimulationError) as refused:
         simulate(path, 0.1, start_values={"der(x)": 0.0, "der(y)": 0.0})
@@ -176,7 +153,7 @@ def test_a_value_that_is_none_is_refused_by_name(target, tmp_path):
 def test_a_model_whose_output_has_no_value_at_its_start_is_refused(tmp_path):
     """Told when the FMU is built, by the same words, and no file is left."""
     with pytest.raises(ModelError, match="'heading' has no value"):
-        build_fmu(pendulum(outputs=[HEADING]), tmp_path, target="native", check=False)
+        build_fmu(swing(outputs=[HEADING]), tmp_path, target="native", check=False)
     assert not list(tmp_path.iterdir())
 
 
@@ -269,7 +246,7 @@ def test_what_an_output_cannot_be_is_told(changes, parts):
     """The output, what is wrong with it, what was expected and what to do; what is solved for cannot stand in
     the equations."""
     with pytest.raises(ModelError) as refused:
-        pendulum(**({"inputs": [Input(F, "N")], "forces": {x: F}} | changes))
+        swing(**({"inputs": [Input(F, "N")], "forces": {x: F}} | changes))
     for part in parts:
         assert part in str(refused.value)
 
@@ -284,7 +261,7 @@ def test_what_an_output_cannot_be_is_told(changes, parts):
 )
 def test_an_output_of_the_command_line_is_that_of_the_file(text, expected):
     """The FMU's names in a formula mean the model's coordinates, rates, lambda and Q."""
-    (found,) = with_outputs(pendulum(), [text]).outputs
+    (found,) = with_outputs(swing(), [text]).outputs
     if expected is None:
         value = m * Abs(x.diff(t, 2)) + force_of_constraint(y) / 2
         assert (found.expression - value).evalf() == 0
@@ -312,6 +289,6 @@ def test_an_output_of_the_command_line_is_that_of_the_file(text, expected):
 def test_a_formula_that_cannot_be_read_is_told(text, parts):
     """What is wrong in it, and what was expected; nothing of it is executed."""
     with pytest.raises(ModelError) as refused:
-        with_outputs(pendulum(), [text])
+        with_outputs(swing(), [text])
     for part in parts:
         assert part in str(refused.value)

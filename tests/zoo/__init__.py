@@ -2,7 +2,7 @@
 
 `point_mass` is what most of them begin from.  contacts: several that close together; forces: that jump or
 end; linkages; redundant: rows that follow from others; tops: rigid bodies in unit quaternions; whipple: a
-bicycle; puck, two_feet: model files, with friction.
+bicycle; pendulums, and a particle on a hemisphere; puck, two_feet: model files, with friction.
 """
 
 from __future__ import annotations
