@@ -42,7 +42,8 @@ static double forest_row(const Elimination *e, double *L, const double *D, int p
 }
 
 /* Row p of L by L y = a, a being row p of A: L_pi = y_i / D_i. */
-static double general_row(const Elimination *e, double *L, const double *D, int p, const Bounds *own, double *pivot) {
+static double general_row(const Elimination *e, const int *begin, double *L, const double *D, int p, const Bounds *own,
+                          double *pivot) {
     const double scale = 1 / sqrt(*pivot);
     double squares = 0, sum = 0, norm = 0, rest = *pivot, size = *pivot;
     double *row = own->row;
@@ -51,7 +52,7 @@ static double general_row(const Elimination *e, double *L, const double *D, int 
         const int i = column[k];
         const double c = fabs(L[k]) * own->scale[i]; /* C_pi = A_pi / (R_p R_i) */
         double y = L[k];
-        for (int r = e->start[i], end = e->start[i + 1]; r < end; r++) y -= L[r] * row[column[r]];
+        for (int r = begin[k], end = e->start[i + 1]; r < end; r++) y -= L[r] * row[column[r]];
         row[i] = y;
         const double l = y * D[i];
         L[k] = l;
@@ -78,7 +79,16 @@ static double norm_bound(const Elimination *e, const Bounds *own) {
     return smaller(norm, e->widest);
 }
 
-Definite ldlt_factor(const Elimination *e, double *L, double *D, const Bounds *own, const int *acts) {
+void ldlt_begins(const Elimination *e, int *begin) {
+    for (int p = 0; p < e->size; p++)
+        for (int k = e->start[p]; k < e->start[p + 1]; k++) {
+            const int i = e->column[k], first = e->column[e->start[p]];
+            begin[k] = e->start[i];
+            while (begin[k] < e->start[i + 1] && e->column[begin[k]] < first) begin[k]++;
+        }
+}
+
+Definite ldlt_factor(const Elimination *e, const int *begin, double *L, double *D, const Bounds *own, const int *acts) {
     Definite found = {HUGE_VAL, HUGE_VAL, 1, -1};
     double trace = 0;
     for (int p = 0; p < e->size; p++) {
@@ -88,7 +98,8 @@ Definite ldlt_factor(const Elimination *e, double *L, double *D, const Bounds *o
             trace += 1;
             continue;
         }
-        double size = e->forest ? forest_row(e, L, D, p, own, &pivot) : general_row(e, L, D, p, own, &pivot);
+        double size =
+            e->forest ? forest_row(e, L, D, p, own, &pivot) : general_row(e, begin, L, D, p, own, &pivot);
         if (!(pivot > 0 && pivot < HUGE_VAL)) {
             found.failed = p;
             return found;
@@ -103,8 +114,8 @@ Definite ldlt_factor(const Elimination *e, double *L, double *D, const Bounds *o
     return found;
 }
 
-double ldlt_trace(const Elimination *e, const double *L, const double *D, const double *diagonal, const int *acts,
-                  const Reverse *x) {
+double ldlt_trace(const Elimination *e, const int *begin, const double *L, const double *D, const double *diagonal,
+                  const int *acts, const Reverse *x) {
     double trace = 0;
     for (int p = 0; p < e->size; p++) x->by_D[p] = D[p];
     for (int k = 0; k < e->start[e->size]; k++) x->by_L[k] = 0;
@@ -122,7 +133,7 @@ double ldlt_trace(const Elimination *e, const double *L, const double *D, const 
         for (int k = to - 1; k >= from; k--) { /* y_i = A_pi - sum_r L_ir y_r */
             const int i = e->column[k];
             const double by_y = x->by_y[i];
-            for (int r = e->start[i]; r < e->start[i + 1]; r++) {
+            for (int r = begin[k]; r < e->start[i + 1]; r++) {
                 x->by_y[e->column[r]] -= L[r] * by_y;
                 x->by_L[r] -= x->l[e->column[r]] * by_y;
             }

@@ -19,10 +19,15 @@ typedef struct {
     double *size, *scale, *norm, *row;
 } Bounds;
 
+/* begin (start[size]): where row i of L, i = column[k], comes to the first column of the row that holds k.  What it has
+ * before meets only zeros there: in a chain that is half of it. */
+SHARED void ldlt_begins(const Elimination *e, int *begin);
+
 /* In place: on entry L holds A's elements below the diagonal in the pattern of L and D its
  * diagonal, in the order of elimination; on return L, and 1 / D.  `acts` (size; NULL: all): 0 for what is passed
  * over, a row of A, by its own number, that is nothing but a 1 on the diagonal. */
-SHARED Definite ldlt_factor(const Elimination *e, double *L, double *D, const Bounds *own, const int *acts);
+SHARED Definite ldlt_factor(const Elimination *e, const int *begin, double *L, double *D, const Bounds *own,
+                            const int *acts);
 
 /* Scratch of ldlt_trace(): derivatives of log det A by the elements of L (its pattern; over D of the column), D and y
  * (size); a row of L (size), zero on entry and return. */
@@ -32,8 +37,8 @@ typedef struct {
 
 /* sum_i A_ii (A^-1)_ii, the trace of the inverse of A scaled to a unit diagonal, from its factors L and D = 1 / D;
  * `diagonal` (size): A_ii by A's own numbers. */
-SHARED double ldlt_trace(const Elimination *e, const double *L, const double *D, const double *diagonal,
-                         const int *acts, const Reverse *x);
+SHARED double ldlt_trace(const Elimination *e, const int *begin, const double *L, const double *D,
+                         const double *diagonal, const int *acts, const Reverse *x);
 
 /* y <- L^-1 y */
 SHARED void ldlt_forward(const Elimination *e, const double *L, double *y);

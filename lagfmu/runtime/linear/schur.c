@@ -49,12 +49,16 @@ void schur_layout(Linear *l, Arena *arena) {
     at.bounds.norm = arena_doubles(arena, full);
     at.bounds.row = arena_doubles(arena, full);
     at.reverse = arena_doubles(arena, plan->schur.forest ? 0 : plan->schur.start[plan->schur.size]);
+    at.mass_begin = arena_ints(arena, plan->mass.start[plan->mass.size]);
+    at.begin = arena_ints(arena, plan->schur.start[plan->schur.size]);
     at.y = arena_doubles(arena, s->nv);
     at.z = arena_doubles(arena, s->m);
     at.lambda = arena_doubles(arena, s->m);
     at.trust = SCHUR_UNSAFE;
     if (arena->base == NULL) return;
     for (int i = 0; i < full; i++) at.bounds.row[i] = 0;
+    ldlt_begins(&plan->mass, at.mass_begin);
+    ldlt_begins(&plan->schur, at.begin);
     *own = at;
     l->sparse = (double *)(void *)own;
 }
@@ -77,7 +81,7 @@ static int factor_masses(const Plan *plan, Schur *own, const double *M) {
     for (int p = 0; p < e->size; p++) own->inverse_mass[p] = M[plan->mass_diagonal[p]];
     for (int k = 0; k < e->start[e->size]; k++)
         own->mass_lower[k] = plan->mass_value[k] < 0 ? 0 : M[plan->mass_value[k]];
-    Definite found = ldlt_factor(e, own->mass_lower, own->inverse_mass, &own->bounds, NULL);
+    Definite found = ldlt_factor(e, own->mass_begin, own->mass_lower, own->inverse_mass, &own->bounds, NULL);
     own->condition = found.bound;
     own->growth = found.growth;
     if (found.failed >= 0) own->doubtful_mass = e->order[found.failed];
@@ -170,7 +174,7 @@ static double traced(const Linear *l, double norm) {
     const Schur *own = schur_of(l);
     const Elimination *e = &l->system->plan->schur;
     const Reverse scratch = {own->reverse, own->z, own->bounds.size, own->bounds.row};
-    return norm * ldlt_trace(e, own->lower, own->inverse, own->diagonal, l->some, &scratch);
+    return norm * ldlt_trace(e, own->begin, own->lower, own->inverse, own->diagonal, l->some, &scratch);
 }
 
 int schur_factor(Linear *l) {
@@ -181,7 +185,7 @@ int schur_factor(Linear *l) {
     if (!schur_masses(l, 0)) return 0;
     if (l->system->m > 0) {
         assemble(plan, own, l->some);
-        Definite found = ldlt_factor(&plan->schur, own->lower, own->inverse, &own->bounds, l->some);
+        Definite found = ldlt_factor(&plan->schur, own->begin, own->lower, own->inverse, &own->bounds, l->some);
         if (found.failed >= 0) own->doubtful_row = plan->schur.order[found.failed];
         own->growth = larger(own->growth, found.growth);
         if (found.failed < 0 && !plan->schur.forest && matters(found.bound, own->growth))

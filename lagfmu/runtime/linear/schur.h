@@ -22,6 +22,7 @@ typedef struct {
     const double *w;           /* W = L^-1 P G^T by rows of G; if M is diagonal that is G itself */
     double *w_own;             /* the same where M is not diagonal */
     double *h;                 /* D^-1 W of rows that act */
+    int *mass_begin, *begin;   /* of L and L': see ldlt_begins() */
     double *lower, *inverse;   /* S = L' D' L'^T: L' and 1 / D' (m) */
     double *diagonal;          /* (m) S_kk by rows of G; 1 where a row does not act */
     Bounds bounds;             /* (max(nv, m)) scratch of ldlt.c */
