@@ -218,12 +218,21 @@ class Mine:
 
 
 def solved(M: Any, F: Any, G: Any, gamma: Any) -> tuple[Any, Any]:
-    """M v' = F + G^T lambda, G v' = gamma, in the null space of G, of full rank: M may be singular."""
-    Q, R = np.linalg.qr(G.T, mode="complete")
-    V, Z, R = Q[:, : len(G)], Q[:, len(G) :], R[: len(G)]
-    vdot = V @ np.linalg.solve(R.T, gamma)
-    vdot += Z @ np.linalg.solve(Z.T @ M @ Z, Z.T @ (F - M @ vdot))
-    return vdot, np.linalg.solve(R, V.T @ (M @ vdot - F))
+    """M v' = F + G^T lambda, G v' = gamma, by an orthogonal factorization: of M^(-1/2) G^T; where M is
+    singular of G^T, which is of full rank in a tree."""
+    size = np.sqrt(np.diag(M))
+    if not size.all() or np.linalg.eigvalsh(M / np.outer(size, size))[0] < SINGULAR:
+        Q, R = np.linalg.qr(G.T, mode="complete")
+        V, Z, R = Q[:, : len(G)], Q[:, len(G) :], R[: len(G)]
+        vdot = V @ np.linalg.solve(R.T, gamma)
+        vdot += Z @ np.linalg.solve(Z.T @ M @ Z, Z.T @ (F - M @ vdot))
+        return vdot, np.linalg.solve(R, V.T @ (M @ vdot - F))
+    root = np.linalg.cholesky(M)
+    free, A = np.linalg.solve(root, F), np.linalg.solve(root, G.T)
+    Q, R = np.linalg.qr(A)
+    c = np.linalg.solve(R.T, gamma) - Q.T @ free
+    lam = np.linalg.solve(R, c)
+    return np.linalg.solve(root.T, free + Q @ c), lam
 
 
 def _words(parts: Any) -> dict[str, str]:

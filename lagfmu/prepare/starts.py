@@ -73,6 +73,7 @@ def check_given(model: str, moved: Iterable[Moved], missed: Sequence[str]) -> No
 NEGATIVE = 1e-12  # a mass below this fraction of its neighbours' is rounding
 INDEFINITE = 1e-8  # an eigenvalue of the scaled mass matrix above -this is rounding
 SEARCHES = 40  # other start values that are tried before constraints are called unsatisfiable
+MANY = 12  # coordinates: the values of more are not told
 
 
 def cause_of_failure(at: Instant, q: Vector, v: Vector) -> str | None:
@@ -104,7 +105,8 @@ def cause_of_failure(at: Instant, q: Vector, v: Vector) -> str | None:
             aside = q + 0.1 * np.maximum(np.abs(q).max(initial=0.0), 1.0)
             M, _, G, _, _ = at.equations(aside, v)
             if not massless(M.toarray(), G[rows].toarray()):
-                remedy = f"elsewhere it has: start at another place than {values}, or take other coordinates"
+                here = values if len(q) <= MANY else "the joints' own"
+                remedy = f"elsewhere it has: start at another place than {here}, or take other coordinates"
             return (
                 f"the mass matrix is singular on the constraint surface: {moving} has neither mass "
                 f"nor a constraint that determines its acceleration; {remedy}"
