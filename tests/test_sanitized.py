@@ -11,9 +11,9 @@ from typing import Any
 
 import pytest
 import runs
-import two_feet
 from conftest import of_each_kind, scene_of
 from runtime import FLAGS, RUNTIME_FILES, SANITIZE, compiler, objects
+from zoo import two_feet
 from zoo.forces import JUMPS
 from zoo.linkages import cart_arm, isosceles
 from zoo.redundant import platform
