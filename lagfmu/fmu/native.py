@@ -12,6 +12,7 @@ from ..codegen.c.equations import entanglements, model_source
 from ..codegen.c.interface import (
     held,
     interface_source,
+    is_led,
     needs_tangents,
     optional_source,
     variables_source,
@@ -155,12 +156,13 @@ def sources_of(prepared: Prepared, listed: bool = True, face: Face = USUAL) -> S
     integrators = held(scene, form)
     measured, joints = bool(table.measured), bool(form.joint_coordinates)
     tangents = needs_tangents(scene, system, face.dae)
-    model = model_source(form, tangents, frozenset(table.varied), grouped=face.fmi == 3)
+    led = is_led(scene, system, integrators, prepared.structure.degrees_of_freedom)
+    model = model_source(form, tangents, frozenset(table.varied), face.fmi == 3, led)
     generated = {
         "model.c": model.encode(),
         "variables.c": variables_source(table, form, scene, system).encode(),
         OPTIONAL: optional_source(
-            scene, system, form, integrators, measured, joints, face.dae
+            scene, system, form, integrators, measured, joints, face.dae, led
         ).encode(),
     }
     if face.fmi == 3:

@@ -24,16 +24,18 @@ from ..parts import Function, Parts, parts_of
 from . import bounds
 from .function import FILL, FUNCTIONS, function
 from .printer import HELPERS, identifiers, table_name, table_text
-from .sparsity import accelerate_source, groups, joint_rates, solve_source
+from .sparsity import accelerate_source, blocks, groups, joint_rates, solve_source
 from .sparsity import plan as plan_of
 
 
 class Tables:
     """Of one system, whose functions have these names: tables that are written, and the fields of its System
-    that hold them.  A field that is not there is 0 or NULL."""
+    that hold them.  A field that is not there is 0 or NULL.  `led`: nothing may be left to integrate."""
 
-    def __init__(self, parts: Parts, functions: Collection[str] = ()) -> None:
-        self.parts, self.eom, self.prefix = parts, parts.eom, parts.prefix
+    def __init__(
+        self, parts: Parts, functions: Collection[str] = (), led: bool = False
+    ) -> None:
+        self.parts, self.eom, self.prefix, self.led = parts, parts.eom, parts.prefix, led
         self.mass, self.entries = parts.mass, parts.jacobian
         self.written = ""
         self.fields: dict[str, Any] = {f: f"{self.prefix}{f}" for f in sorted(functions)}
@@ -230,6 +232,8 @@ class Tables:
             "separable": int(not entanglements(eom, parts.formulation)),
             "plan": f"&{p}plan",
         }
+        if self.led and eom.m == eom.nv:
+            self._square(blocks(eom.nv, self.entries))
         if parts.formulation == "nullspace":
             return
         solve = solve_source(f"{p}solve", eom.nv, self.entries, plan)
@@ -241,6 +245,24 @@ class Tables:
             counts = (len(self.mass), eom.nv, len(self.entries), eom.m, eom.m)
             self.written += accelerate_source(p, counts) + "\n"
             self.fields["accelerate"] = f"{p}accelerate"
+
+    def _square(self, found: Sequence[tuple[Sequence[int], Sequence[int]]]) -> None:
+        """The blocks by which square.c solves."""
+        if not found:
+            return
+        members = [f".{of} = square_{of}" for of in ("layout", "factor", "solve", "sign")]
+        tables = {
+            "start": [*accumulate((len(rows) for rows, _ in found), initial=0)],
+            "rows": [r for rows, _ in found for r in rows],
+            "columns": [c for _, columns in found for c in columns],
+        }
+        for name, values in tables.items():
+            self.written += self._integers(f"block_{name}", values)
+            members.append(f".{name} = {self.prefix}block_{name}")
+        members.append(f".count = {len(found)}")
+        lines = "".join(f"    {member},\n" for member in members)
+        self.written += f"static const Square {self.prefix}blocks = {{\n{lines}}};\n"
+        self.fields["square"] = f"&{self.prefix}blocks"
 
     def _pair(self, kind: str, **tables: Sequence[Any]) -> None:
         """A table for coordinates and one for speeds; one for both where they are alike."""
@@ -334,11 +356,13 @@ def model_source(
     tangents: bool = True,
     by: frozenset[str] = frozenset(),
     grouped: bool = False,
+    led: bool = False,
 ) -> str:
     """C text that defines MODEL_SYSTEM, the numeric form of the equations.
 
     `tangents`: with the derivatives that directional derivatives and radau5 need; `by`: parameters by which
-    they are taken as well; `grouped`: with the groups of their columns, for FMI 3.0.
+    they are taken as well; `grouped`: with the groups of their columns, for FMI 3.0; `led`: nothing may be
+    left to integrate.
 
     Raises DerivationError if a function or a number has no counterpart in C.
     """
@@ -354,7 +378,9 @@ def model_source(
     index += _index("constraints", [c.name for c in eom.constraints])
     if len(whole) > 1:
         index += _index("coordinates that are stepped", whole[-1].eom.q)
-    text = "\n".join(piece for parts in whole for piece in (*_embedding(parts), _system(parts)))
+    text = "\n".join(
+        piece for parts in whole for piece in (*_embedding(parts), _system(parts, led))
+    )
     text += POINTER.format(whole[-1].prefix)
     if grouped:
         text += Tables(whole[-1]).groups()
@@ -365,6 +391,8 @@ def model_source(
     model = eom.model
     description = f": {model.description}" if model.description else ""
     head = HEAD.format(name=model.name, description=_comment(description), index=index)
+    if ".square = &" in text:
+        head += '#include "square.h"\n'
     if grouped:
         head += '#include "dependencies.h"\n'
     return "\n".join([head, *helpers, text])
@@ -448,7 +476,7 @@ def _define(f: Function, names: Mapping[Expr, str], prefix: str = "") -> str:
     return function(prefix + f.name, f.doc, f.arguments, f.results, names)
 
 
-def _system(parts: Parts) -> str:
+def _system(parts: Parts, led: bool) -> str:
     """Functions, then tables."""
     names = _names(parts)
     own = [f for f in parts.functions if f.name.startswith("outputs")]
@@ -457,7 +485,7 @@ def _system(parts: Parts) -> str:
     if changing:
         texts["bounds"] = _bounds(parts, changing)
     texts |= {f.name: _define(f, _reported(parts, names)) for f in own}
-    tables = Tables(parts, texts)
+    tables = Tables(parts, texts, led)
     last = tables.of_what_is_read() if parts.eom.bare else tables.text()
     return "\n".join([*texts.values(), last])
 

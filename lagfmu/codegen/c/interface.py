@@ -18,7 +18,7 @@ from ... import names
 from ...interface.variables import CALCULATED, Variable, VariableTable
 from ...mechanics.formulations import Form
 from ...mechanics.kinematics import start_names
-from ...methods import AUTO, MENU, NUMBERS, SEPARABLE, STIFF, UNLESS_STIFF, WITH_TANGENTS
+from ...methods import AUTO, FIXED_STEP, MENU, NUMBERS, SEPARABLE, STIFF, UNLESS_STIFF, WITH_TANGENTS
 from ...model.scene import Scene
 from ...numeric.system import System
 from .equations import entanglements
@@ -316,6 +316,7 @@ def _lines(values: Sequence[int]) -> str:
     return "\n".join(wrap(text, 96, initial_indent="    ", subsequent_indent="    "))
 
 
+NO_FREEDOM = "inverse_dynamics"
 NO_RUNGS = """
 #include "dependent.h"
 
@@ -352,9 +353,11 @@ def optional_source(
     peaks: bool = False,
     joints: bool = False,
     dae: bool = False,
+    led: bool = False,
 ) -> str:
     """C text that defines OPTIONAL; `found` are the integrators; `peaks`: extremes are kept; `joints`: joint
-    coordinates may be given at the start; `dae`: an importer may solve for the multipliers."""
+    coordinates may be given at the start; `dae`: an importer may solve for the multipliers; `led`: nothing may be left to
+    integrate."""
     contacts = bool(system.contacts or system.frictions)
     menu = {m: m for m in found}
     if AUTO in scene.selectable:
@@ -362,6 +365,7 @@ def optional_source(
     rows = [f"    .methods[{NUMBERS[m]}] = &{of},\n" for m, of in menu.items()]
     rows += [f'    .names[{m.number}] = "{m.name}",\n' for m in MENU]
     rows += [f"    .implicit = &{STIFF},\n"] if STIFF in found else []
+    rows += [f"    .methods[0] = &{NO_FREEDOM},\n    .led = {NO_FREEDOM}_applies,\n"] if led else []
     rows += [f"    .unfit = {NUMBERS[m]},\n" for m in _unfit(form)]
     rows += ["    .events = &EVENTS,\n"] if system.is_watched else []
     rows += ["    .contacts = &CONTACTS,\n"] if contacts else []
@@ -380,7 +384,8 @@ def optional_source(
     what += ", derivatives of a run" if scene.sensitivities else ""
     rungs = "" if system.is_constrained else NO_RUNGS
     rungs += "" if _moves(system) else NO_KINEMATICS
-    declared = "".join(f"SHARED const Method {m};\n" for m in found)
+    stepping = (*found, *([NO_FREEDOM] if led else []))
+    declared = "".join(f"SHARED const Method {m};\n" for m in stepping)
     return (
         OPTIONAL.format(what=what, rungs=rungs, methods=declared)
         + "".join(rows)
@@ -396,6 +401,19 @@ def _features(names: list[str]) -> str:
     return (
         f"\n{declared}SHARED_VALUE const Feature *const *const FEATURES =\n"
         f"    (const Feature *const[]){{{rows}NULL}};\n"
+    )
+
+
+def is_led(scene: Scene, system: System, integrators: tuple[str, ...], freedom: int) -> bool:
+    """True if constraints and prescribed motions leave nothing to integrate, by a method that would."""
+    held = [row for row in system.rows if row.kind == "holonomic" and row.while_closed is None]
+    return (
+        freedom == 0
+        and len(held) == len(system.rows) >= len(system.speeds)
+        and not (system.embedding or system.frictions or scene.error_bars or scene.sensitivities)
+        and not {*integrators} <= {*FIXED_STEP}
+        and len(system.coordinates)
+        == len(system.speeds) + len(system.quaternions) + len(system.unwrapped)
     )
 
 

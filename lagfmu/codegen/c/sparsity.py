@@ -25,6 +25,10 @@ Which columns of a matrix can be found at once: those of which no two stand in o
 The columns of a row exclude each other; each column gets the first group in which none is that it
 excludes (Curtis, Powell & Reid, On the estimation of sparse Jacobian matrices, 1974).  Of a chain of
 bodies there are as many groups as three neighbours have coordinates and speeds, however long it is.
+
+The order in which a square G is lower triangular in blocks, for runtime/linear/square.c.  Each row is matched
+with a column in which it has an entry; a row leads to the rows with which its other columns are matched, and rows
+that lead to each other are one block (Duff, Erisman & Reid, Direct Methods for Sparse Matrices, ch. 6).
 """
 
 from __future__ import annotations
@@ -34,10 +38,14 @@ import textwrap
 from collections import Counter, defaultdict
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields
+from graphlib import TopologicalSorter
 from itertools import chain, count
 from typing import Any
 
+import numpy as np
 import sympy as sp
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components, maximum_bipartite_matching
 
 from ...model.elements import Expr
 from ..parts import Parts
@@ -449,3 +457,22 @@ def _wrapped(line: str) -> str:
             room = "        "
         room += word + " "
     return "\n".join([*rows, room.rstrip()]) + "\n"
+
+
+def blocks(n: int, jacobian: Sequence[tuple[int, int]]) -> list[tuple[list[int], list[int]]]:
+    """The rows and the columns of each block, of the n rows and columns with entries at `jacobian`, each
+    behind all those whose columns stand in its rows.  [] where no matching takes all rows."""
+    row, column = np.array(jacobian, dtype=np.int32).reshape(-1, 2).T
+    G = csr_array((np.ones(len(row), dtype=np.int8), (row, column)), shape=(n, n))
+    matched = maximum_bipartite_matching(G, perm_type="column")
+    if (matched < 0).any():
+        return []
+    of_column = np.argsort(matched)
+    leads = csr_array((np.ones(len(row)), (row, of_column[column])), shape=(n, n))
+    count, label = connected_components(leads, connection="strong")
+    before: dict[int, set[int]] = {k: set() for k in range(count)}
+    for r, c in zip(row, column, strict=True):
+        before[label[r]].add(int(label[of_column[c]]))
+    order = TopologicalSorter({k: found - {k} for k, found in before.items()}).static_order()
+    rows = [[r for r in range(n) if label[r] == k] for k in order]
+    return [(block, [int(matched[r]) for r in block]) for block in rows]

@@ -86,6 +86,7 @@ struct System {
     int angles;                  /* the number of those without dimension; -1: none */
     Formulation formulation;
     int separable;            /* constant mass, forces without velocities, position constraints only */
+    const struct Square *square; /* square.h: where constraints and prescribed motions leave no freedom; else NULL */
     const Plan *plan;         /* sparse elimination, found when the FMU was built */
     /* x (nv) and lambda (m) of  M x = b + G^T lambda,  G x = c  with all rows acting, the plan written
      * out for a small system; 0 where that is not safe: then linear.h decides.  NULL: not there. */

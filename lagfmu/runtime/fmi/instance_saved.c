@@ -29,6 +29,7 @@ void instance_restore(Instance *x, const char *record) {
     x->given = head.given;
     s->drive.since = head.since;
     s->stop_time = head.stop_time;
+    s->shown = 0;
     INSTANCE_NUMBERS(PUT)
     if (ALGEBRAIC != NULL) ALGEBRAIC->apply(x);
     x->unsettled = 0;

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "digits.h"
+#include "optional.h"
 #include "prescribed.h"
 #include "segment.h"
 
@@ -53,6 +54,23 @@ static void tell_of_method(Instance *x, double product, int implicit) {
     if (implicit == c->implicit) return;
     (void)snprintf(x->note, sizeof x->note, "at t = %s s: going on with %s again",
                    digits(x->solver.state.now.t).text, c->implicit ? "radau5" : "dop853");
+    x->tell(x->context, NOTE_EVENT, x->note);
+}
+
+/* Of a step that began with nothing to integrate, or not: whether that has changed. */
+static void tell_of_freedom(Instance *x, double begun, int led) {
+    const Solver *s = &x->solver;
+    const char *name = OPTIONAL.names[s->settings.method];
+    if (led == s->state.now.led) return;
+    if (led)
+        (void)snprintf(x->note, sizeof x->note,
+                       "at t = %s s: the constraints alone do not lead on: going on with %s",
+                       digits(s->state.now.t).text, name);
+    else
+        (void)snprintf(x->note, sizeof x->note,
+                       "from t = %s s on: constraints and prescribed motions leave no freedom, so that nothing is "
+                       "integrated, and %s is not needed: each state is found from the constraints",
+                       digits(begun).text, name);
     x->tell(x->context, NOTE_EVENT, x->note);
 }
 
@@ -158,8 +176,8 @@ Status instance_step(Instance *x, double t_end) {
         show_end(x);
         return OK;
     }
-    const double product = s->state.now.choice.product;
-    const int implicit = s->state.now.choice.implicit;
+    const double begun = s->state.now.t, product = s->state.now.choice.product;
+    const int implicit = s->state.now.choice.implicit, led = s->state.now.led;
     prepare_step(x, t_end);
     if (solver_advance(s, t_end) != OK) {
         s->caller.supply = NULL;
@@ -169,6 +187,7 @@ Status instance_step(Instance *x, double t_end) {
     }
     finish_step(x);
     tell_of_method(x, product, implicit);
+    tell_of_freedom(x, begun, led);
     show_end(x);
     return OK;
 }

@@ -73,7 +73,7 @@ static Status each_of_solver(Instance *x, const Solver *solver) {
     const Numbers *of = &a->now;
     const Integrator *i = &solver->integrator;
     const Method *const chosen = x->started ? OPTIONAL.methods[solver->settings.method] : NULL;
-    const Method *now = x->started && of->choice.implicit ? OPTIONAL.implicit : chosen;
+    const Method *now = x->started && of->led ? OPTIONAL.methods[NO_FREEDOM] : x->started && of->choice.implicit ? OPTIONAL.implicit : chosen;
     const int width = solver_width(solver);
     if (each_of_choice(x, &of->choice) != OK || each_of_approach(x, &of->approach) != OK) return FAILED;
     STATE_NUMBERS(SOUND_NUMBER)
@@ -136,6 +136,7 @@ static Status together_in_solver(Instance *x, const Solver *s) {
     const Choice *c = &now->choice;
     if ((c->implicit || c->turn) && (s->settings.method != AUTO || OPTIONAL.implicit == NULL))
         return restored_none(x, "stiffness mode", c->implicit);
+    if (now->led && OPTIONAL.methods[NO_FREEDOM] == NULL) return restored_none(x, "freedom", now->led);
     if (c->failures > STIFFNESS_MOST_FAILURES || c->retries > STIFFNESS_MOST_RETRIES)
         return restored_none(x, "stiffness memory", c->failures + c->retries);
     if (now->approach.near && OPTIONAL.passage == NULL)

@@ -13,6 +13,7 @@
 #include "numbers.h"
 #include "refinement.h"
 #include "schur.h"
+#include "square.h"
 #include "stiffened.h"
 #include "thresholds.h"
 
@@ -39,6 +40,8 @@ void linear_layout(Linear *l, Arena *arena, const System *s, Why *why) {
     schur_layout(l, arena);
     refinement_layout(l, arena);
     stiffened_layout(l, arena);
+    l->square = NULL;
+    if (s->square != NULL) s->square->layout(l, arena);
     l->dense = NULL;
     l->pivots = NULL;
     l->nearest = 0;
@@ -159,6 +162,10 @@ Status linear_factor_kept(Linear *l, const double *M, const double *G, const int
         l->rung = RUNG_WRITTEN_OUT; /* it factors and solves at once */
         return OK;
     }
+    if (all && l->system->square != NULL && !(l->off > 0) && l->system->square->factor(l)) {
+        l->rung = RUNG_SQUARE;
+        return OK;
+    }
     if (l->system->formulation == NULLSPACE && l->dense != NULL && DEPENDENT != NULL &&
         DEPENDENT->nullspace(l))
         return OK;
@@ -192,6 +199,7 @@ static Status solve_dense(Linear *l, const double *b, const double *c, double *x
 Status linear_solve(Linear *l, const double *b, const double *c, double *x, double *lambda) {
     const double *forces = b;
     const int asked = lambda != NULL && b != NULL;
+    if (l->rung == RUNG_SQUARE) l->system->square->solve(l, b, c, x, lambda);
     if (lambda == NULL) lambda = schur_of(l)->lambda;
     if (l->rung == RUNG_WRITTEN_OUT) {
         if (l->system->solve(l->M, b != NULL ? b : l->zero, l->G, c, x, lambda)) return OK;
@@ -199,7 +207,9 @@ Status linear_solve(Linear *l, const double *b, const double *c, double *x, doub
     }
     if (l->stiffened) b = stiffened_forces(l, b, c);
     Status status = OK;
-    if (l->rung == RUNG_KEPT) {
+    if (l->rung == RUNG_SQUARE) {
+        for (int k = 0; k < l->system->m && !asked; k++) lambda[k] = 0;
+    } else if (l->rung == RUNG_KEPT) {
         if (!DEPENDENT->solve_kept(l, b, c, x, lambda)) {
             none_shared(l);
             if (check_right(l, b, c) != OK || climb(l) != OK) return FAILED;
@@ -230,7 +240,7 @@ Status linear_nearest(Linear *l, const double *b, const double *c, double *x, do
 }
 
 double linear_apart(const Linear *l) {
-    return l->rung == RUNG_WRITTEN_OUT || l->rung == RUNG_NULLSPACE ? 1 : schur_of(l)->apart;
+    return l->rung == RUNG_WRITTEN_OUT || l->rung == RUNG_SQUARE || l->rung == RUNG_NULLSPACE ? 1 : schur_of(l)->apart;
 }
 
 double linear_furthest_apart(const Linear *l) {
@@ -238,7 +248,7 @@ double linear_furthest_apart(const Linear *l) {
 }
 
 int linear_plain(const Linear *l) {
-    return l->rung == RUNG_SCHUR || l->rung == RUNG_WRITTEN_OUT || l->rung == RUNG_NULLSPACE;
+    return l->rung == RUNG_SCHUR || l->rung == RUNG_WRITTEN_OUT || l->rung == RUNG_SQUARE || l->rung == RUNG_NULLSPACE;
 }
 
 int linear_basis(Linear *l, int *basis) {

@@ -18,6 +18,7 @@
 typedef enum {
     RUNG_SCHUR, RUNG_KKT, RUNG_ORTHOGONAL, RUNG_LEAST_NORM, RUNG_NULLSPACE,
     RUNG_KEPT,       /* dependent rows, by those that stand for all */
+    RUNG_SQUARE,     /* as many rows as speeds: square.c */
     RUNG_WRITTEN_OUT /* the first, as system->solve */
 } Rung;
 
@@ -44,6 +45,7 @@ typedef struct {
     const double *bare;   /* then: M as it was given */
     double *masses, *forces, *sigma; /* (masses), (nv), (m) of stiffened.c */
     int *holds;           /* (m) */
+    struct SquareMemory *square; /* of square.c; NULL without system->square */
     double off;           /* how far off the constraints the state is, relative to their size; 0: on them */
     int nearest;          /* 1 within linear_nearest() and linear_project() */
 } Linear;

@@ -57,6 +57,7 @@ struct Method {
     int last_stage; /* arrays in `dense` before two of a stage at t, its argument and its rate, which
                      * stay as they are; 0: they are not kept */
     int coarse;                       /* dense() has fewer digits than the step: to search by, not to be read */
+    int exact;                        /* what it steps to is on the constraints, and has no error of a step */
     int fixed;                        /* a fixed step that divides the way to t_bound evenly, ... */
     double fewest_steps;              /* ... so many in one natural time of the motion unless solver.step is set */
     int of_mechanism;                 /* 1: it steps ode->mechanism, whose rows stay as they are */
@@ -65,6 +66,9 @@ struct Method {
      * completed lazily by `prepare_dense`.  FAILED (step size underflow, not finite): as before the
      * call, but that f may be known now. */
     Status (*step)(Integrator *i, const Ode *ode, const Control *control, double t_bound);
+    /* Where a step of rows that depend on each other or may begins, whose motion has been evaluated there: `of` is the
+     * Ode's context.  NULL: nothing to do. */
+    void (*begin)(Integrator *i, void *of);
     /* Evaluates what dense() needs beyond the step itself; called at most once a step.  To be
      * called before y is changed by a projection, after which dense() answers as before.  NULL:
      * nothing to do. */

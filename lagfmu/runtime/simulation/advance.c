@@ -42,13 +42,14 @@ void advance_layout(Solver *s, Arena *scratch) {
 }
 
 static const Method *method_of(const Solver *s) {
+    if (s->state.now.led) return OPTIONAL.methods[NO_FREEDOM];
     return s->state.now.choice.implicit ? OPTIONAL.implicit : OPTIONAL.methods[s->settings.method];
 }
 
 /* May the integrator stand ahead of the communication point?  Not with inputs, which may change; not
- * at a fixed step, which divides the communication step; not where a slip may come to rest on the way. */
+ * at a fixed step, which divides the communication step; not where that costs as much as to step to it; not where a slip may come to rest on the way. */
 static int runs_ahead(const Solver *s) {
-    if (s->system->inputs > 0 || method_of(s)->fixed) return 0;
+    if (s->system->inputs > 0 || method_of(s)->fixed || method_of(s)->exact) return 0;
     return s->system->frictions == 0 || !OPTIONAL.friction->turns(s);
 }
 
@@ -78,12 +79,19 @@ static void keep(Solver *s) {
     now->fresh = i->fresh;
 }
 
+/* 1: nothing is left to integrate. */
+static int is_led(const Solver *s) {
+    return OPTIONAL.methods[NO_FREEDOM] != NULL && !OPTIONAL.methods[s->settings.method]->fixed && s->columns == 0 &&
+           OPTIONAL.led(s);
+}
+
 /* Puts the integrator at the state; the indicators there. */
 static Status set_out(Solver *s) {
     State *x = &s->state;
     double *y = s->part.advance->y;
     state_gather(s->system, x->q, x->v, y);
     if (s->columns > 0) columns_gather(s, y);
+    x->now.led = is_led(s);
     if (stiffness_turn(&x->now.choice)) x->now.step = x->now.choice.longest;
     restart(s, x->now.t, y, x->now.step);
     x->now.ahead = 1;
@@ -137,8 +145,9 @@ static Status step_towards(Solver *s, double t_end, double bound, double longest
     if ((watch || near || features_everywhere(s) || i->t > t_end) && segment_prepare_dense(s, i) != OK) return FAILED;
     if (i->t > t_end) s->state.now.rough = segment_dense_rough(s, i);
     memcpy(y1, i->y, (size_t)i->ny * sizeof *y1);
-    if (segment_project(s, i->t, y1) != OK) return FAILED;
-    if (segment_check_projection(s, i->t, i->y, y1) != OK) return FAILED;
+    if (!i->method->exact && (segment_project(s, i->t, y1) != OK ||
+                              segment_check_projection(s, i->t, i->y, y1) != OK))
+        return FAILED;
     if (near && OPTIONAL.passage->find(s) != OK) return FAILED;
     if (watch && OPTIONAL.events->find(s, y1) != OK) return FAILED;
     if (s->system->frictions > 0 && slide_on(s, y1) != OK) return FAILED;
@@ -177,12 +186,17 @@ static void choose_method(Solver *s) {
     restart(s, i->t, y, choice->longest);
 }
 
-/* Where radau5 fails, dop853 goes on. */
+/* Where radau5 fails, dop853 goes on; where the constraints alone do not lead on, the chosen method does. */
 static Status take_step(Solver *s, double t_end) {
-    if (s->settings.method == AUTO) choose_method(s);
+    if (s->settings.method == AUTO && !s->state.now.led) choose_method(s);
     const double t = s->integrator.t;
     const Status status = try_step(s, t_end);
-    if (status == OK || !s->state.now.choice.implicit) return status;
+    if (status == OK || !(s->state.now.led || s->state.now.choice.implicit)) return status;
+    if (s->state.now.led) {
+        s->state.now.led = 0;
+        take_back(s, t, 0);
+        return try_step(s, t_end);
+    }
     stiffness_explicit(&s->state.now.choice, 0);
     take_back(s, t, s->state.now.choice.longest);
     return try_step(s, t_end);
@@ -268,7 +282,7 @@ static Status arrive(Solver *s, double t_end) {
     if (s->system->frictions > 0 && count_loss(s, t_end) != OK) return FAILED;
     FEATURES_DO(s, pass, s, t_end, NULL);
     now->step = i->h_next;
-    if (!runs_ahead(s)) now->ahead = 0;
+    if (!runs_ahead(s) && !(now->led && s->system->inputs == 0)) now->ahead = 0;
     return OK;
 }
 

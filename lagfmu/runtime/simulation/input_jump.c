@@ -66,4 +66,5 @@ void solver_inputs_changed(Solver *s) {
     now->ahead = 0;
     now->event_count = 0;
     now->fresh = 1;
+    s->shown = 0;
 }

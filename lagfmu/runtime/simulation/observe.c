@@ -115,6 +115,7 @@ static Status observe_solved(Solver *s, Instant at, Mechanism *b, Observed *o) {
                                                                s->state.span)
                                        : mechanism_motion(b, at, o->q, o->v, active);
     if (status == FAILED) return FAILED;
+    s->shown = b == &s->stepped && !b->dependent ? b->evaluations : 0;
     observe_forces(b, o);
     if (s->system->frictions > 0) OPTIONAL.friction->observe(s, o);
     return observe_residuals(s, at, b, o);

@@ -3,11 +3,12 @@
 
 #include "feature.h"
 
-SHARED const Method dop853, rk4, radau5, rattle;
+SHARED const Method dop853, rk4, radau5, rattle, inverse_dynamics;
 
 SHARED_VALUE const Optional OPTIONAL = {
-    .methods = {NULL, &dop853, &dop853, &rk4, &radau5, &rattle}, /* in the order of lagfmu/methods.py */
+    .methods = {&inverse_dynamics, &dop853, &dop853, &rk4, &radau5, &rattle}, /* in the order of lagfmu/methods.py */
     .implicit = &radau5,
+    .led = inverse_dynamics_applies,
     .events = &EVENTS,
     .contacts = &CONTACTS,
     .switches = &SWITCHES,

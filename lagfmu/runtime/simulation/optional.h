@@ -17,10 +17,17 @@
 #include "modes.h"
 #include "variation.h"
 
+enum { NO_FREEDOM = 0 }; /* a number that no method has which may be chosen */
+
+/* inverse.c: do the rows that act, positions' alone and as many as are independent, leave nothing free? */
+SHARED int inverse_dynamics_applies(const Solver *s);
+
 typedef struct {
     /* Integrators by their numbers, that of AUTO being the explicit one, NULL where it is left out; its implicit one; the
      * number of a method that cannot step these equations, 0: of none; names, of those too that are left out. */
     const Method *methods[METHODS_MOST], *implicit;
+    /* Where prescribed motions may leave no freedom: that of NO_FREEDOM, and do they? */
+    int (*led)(const Solver *s);
     int unfit;
     const char *names[METHODS_MOST];
     /* Finds events; NULL where there is nothing to watch. */

@@ -134,7 +134,7 @@ static Control control(const Solver *s, const Integrator *i, double longest) {
     if (s->limit > 0) longest = fmin(longest, s->limit);
     if (s->state.now.approach.near) longest = fmin(longest, OPTIONAL.passage->longest(s, i->h_next));
     if (set->maximum_step > 0) longest = fmin(longest, set->maximum_step);
-    if (!s->integrator.method->fixed) nominals_shared(s, i->y, s->scale);
+    if (!s->integrator.method->fixed && !s->integrator.method->exact) nominals_shared(s, i->y, s->scale);
     return (Control){TOLERANCE_SHARE * segment_tolerance(s), s->scale, longest < HUGE_VAL ? longest : 0,
                      fixed};
 }
@@ -151,19 +151,22 @@ static Status check_fixed_step(Solver *s, const Integrator *i) {
 
 /* The accelerations at the state on the constraints where a step begins: by all rows, of which those that
  * depend on others are then left out in the step's stages, which lie off the constraints; they are chosen anew
- * where those of the step before do no longer. */
+ * where those of the step before do no longer.  Where nothing is integrated they may have been shown. */
 static Status accept(Solver *s, Integrator *i) {
     const int nq = s->system->nq, nv = s->system->nv;
     if (i != &s->integrator || !i->fresh || s->system->m < 2) return OK;
     const double *y = i->y;
     const Instant at = segment_instant(s, i->t);
-    const int kept = mechanism_motion_kept(&s->stepped, at, y, y + nq, s->active) &&
-                     linear_apart(&s->stepped.linear) > KEPT_APART;
+    const int shown = i->method->exact && i->t == s->state.now.t && s->shown == s->stepped.evaluations;
+    const int known = shown ? linear_plain(&s->stepped.linear)
+                            : mechanism_motion_kept(&s->stepped, at, y, y + nq, s->active);
+    const int kept = known && linear_apart(&s->stepped.linear) > KEPT_APART;
     if (!kept && mechanism_motion(&s->stepped, at, y, y + nq, s->active) != OK) return FAILED;
     mechanism_rates(&s->stepped, y + nq, i->f);
     memcpy(i->f + nq, s->stepped.vdot, (size_t)nv * sizeof *y);
     if (s->columns > 0) OPTIONAL.variation->rates(s, i->t, y, i->f + nq + nv);
     i->fresh = 0;
+    if (i->method->begin != NULL) i->method->begin(i, s);
     if (!kept) segment_choose_rows(s);
     if (OPTIONAL.passage != NULL) OPTIONAL.passage->look(s, i->t, y); /* evaluates elsewhere */
     return OK;

@@ -72,6 +72,7 @@ typedef struct Solver {
     int columns;               /* how many columns of derivatives go with the state (variation.h), and ... */
     const Column *column;      /* (columns) ... by what; both are set before the layout */
     Stages stages;
+    unsigned long shown;       /* stepped.evaluations when all rows' motion at the communication point was; 0: it was not */
     Parts part;
     Why passed;                /* singular configurations passed since the caller emptied it, as a sentence */
     Why why;

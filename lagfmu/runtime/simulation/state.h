@@ -69,6 +69,7 @@ typedef struct {
     N(Count, tiny, TALLY, "step count")                       /* of the present one, those that make no headway */   \
     N(int, ahead, FLAG, "mode of the step ahead")             /* 1: the integrator stands at t_integrator >= t, and dense
                                                                * output answers */                                   \
+    N(int, led, FLAG, "freedom")                              /* 1: there is none: nothing is integrated (inverse.c) */ \
     N(int, between, FLAG, "mode of the step ahead")           /* 1: q and v are still to be found: solver_arrive() */ \
     N(double, event_time, FINITE, "time of the event")        /* [s] found in the step ahead; only if event_count > 0 */ \
     N(int, event_count, COUNT, "count of events")             /* indicators that leave their ranges then */          \
