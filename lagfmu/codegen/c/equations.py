@@ -32,9 +32,7 @@ class Tables:
     """Of one system, whose functions have these names: tables that are written, and the fields of its System
     that hold them.  A field that is not there is 0 or NULL.  `led`: nothing may be left to integrate."""
 
-    def __init__(
-        self, parts: Parts, functions: Collection[str] = (), led: bool = False
-    ) -> None:
+    def __init__(self, parts: Parts, functions: Collection[str] = (), led: bool = False) -> None:
         self.parts, self.eom, self.prefix, self.led = parts, parts.eom, parts.prefix, led
         self.mass, self.entries = parts.mass, parts.jacobian
         self.written = ""

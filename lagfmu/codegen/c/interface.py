@@ -18,7 +18,16 @@ from ... import names
 from ...interface.variables import CALCULATED, Variable, VariableTable
 from ...mechanics.formulations import Form
 from ...mechanics.kinematics import start_names
-from ...methods import AUTO, FIXED_STEP, MENU, NUMBERS, SEPARABLE, STIFF, UNLESS_STIFF, WITH_TANGENTS
+from ...methods import (
+    AUTO,
+    FIXED_STEP,
+    MENU,
+    NUMBERS,
+    SEPARABLE,
+    STIFF,
+    UNLESS_STIFF,
+    WITH_TANGENTS,
+)
 from ...model.scene import Scene
 from ...numeric.system import System
 from .equations import entanglements
@@ -356,8 +365,8 @@ def optional_source(
     led: bool = False,
 ) -> str:
     """C text that defines OPTIONAL; `found` are the integrators; `peaks`: extremes are kept; `joints`: joint
-    coordinates may be given at the start; `dae`: an importer may solve for the multipliers; `led`: nothing may be left to
-    integrate."""
+    coordinates may be given at the start; `dae`: an importer may solve for the multipliers; `led`: nothing
+    may be left to integrate."""
     contacts = bool(system.contacts or system.frictions)
     menu = {m: m for m in found}
     if AUTO in scene.selectable:

@@ -26,9 +26,10 @@ The columns of a row exclude each other; each column gets the first group in whi
 excludes (Curtis, Powell & Reid, On the estimation of sparse Jacobian matrices, 1974).  Of a chain of
 bodies there are as many groups as three neighbours have coordinates and speeds, however long it is.
 
-The order in which a square G is lower triangular in blocks, for runtime/linear/square.c.  Each row is matched
-with a column in which it has an entry; a row leads to the rows with which its other columns are matched, and rows
-that lead to each other are one block (Duff, Erisman & Reid, Direct Methods for Sparse Matrices, ch. 6).
+The order in which a square G is lower triangular in blocks, for runtime/linear/square.c.  Each row is
+matched with a column in which it has an entry; a row leads to the rows with which its other columns are
+matched, and rows that lead to each other are one block (Duff, Erisman & Reid, Direct Methods for Sparse
+Matrices, ch. 6).
 """
 
 from __future__ import annotations

@@ -198,8 +198,7 @@ static Status solve_dense(Linear *l, const double *b, const double *c, double *x
 
 Status linear_solve(Linear *l, const double *b, const double *c, double *x, double *lambda) {
     const double *forces = b;
-    const int asked = lambda != NULL && b != NULL;
-    if (l->rung == RUNG_SQUARE) l->system->square->solve(l, b, c, x, lambda);
+    const int told = lambda != NULL, asked = told && b != NULL;
     if (lambda == NULL) lambda = schur_of(l)->lambda;
     if (l->rung == RUNG_WRITTEN_OUT) {
         if (l->system->solve(l->M, b != NULL ? b : l->zero, l->G, c, x, lambda)) return OK;
@@ -208,7 +207,8 @@ Status linear_solve(Linear *l, const double *b, const double *c, double *x, doub
     if (l->stiffened) b = stiffened_forces(l, b, c);
     Status status = OK;
     if (l->rung == RUNG_SQUARE) {
-        for (int k = 0; k < l->system->m && !asked; k++) lambda[k] = 0;
+        l->system->square->solve(l, b, c, x, told ? lambda : NULL);
+        for (int k = 0; k < l->system->m && !told; k++) lambda[k] = 0;
     } else if (l->rung == RUNG_KEPT) {
         if (!DEPENDENT->solve_kept(l, b, c, x, lambda)) {
             none_shared(l);

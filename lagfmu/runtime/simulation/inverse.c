@@ -17,14 +17,14 @@
 #include "square.h"
 #include "step_size.h"
 
-static const double HELD_AGAINST = 0.382; /* where in the step the cubic is held against f: not in its middle, where a motion
-                                      * of its period is on it */
-static const double BRANCH = 1e-3;   /* of the coordinates */
-static const double LOOKED_AT = 0.1; /* times tolerance^(2/3): as of radau5, whose dense output serves to search, too */
-enum { APPROACHES = 3 };          /* of simplified Newton steps before the projection */
-static const double TURNS = 0.1;    /* [rad] */
+static const double HELD_AGAINST = 0.382; /* of the step: where the cubic is held against f; in its middle a motion of the
+                                           * step's period is on it */
+static const double BRANCH = 1e-3;        /* of the coordinates */
+static const double LOOKED_AT = 0.1;      /* times tolerance^(2/3), as radau5, whose dense output serves to search, too */
+static const double TURNS = 0.1;          /* [rad] of a step, and parts of sizes, by which rows turn little */
+static const double FOLLOWED = 2;         /* steps before, so far the cubic is followed beyond it */
 static const double INVERSE_SAFE = 0.9, INVERSE_LEAST = 0.2, INVERSE_MOST = 5; /* of the step's change */
-static const double TOLD_APART = 2;  /* of the step before: how far the cubic is followed beyond it */
+enum { APPROACHES = 3 };                  /* simplified Newton steps before the projection, at most */
 
 /* y (n) <- the cubic through (y, f) at t = 0 and 1, f times the step, at t. */
 static void led_cubic(int n, const double *y0, const double *f0, const double *y1, const double *f1, double h, double t,
@@ -41,7 +41,7 @@ static void foresee(Solver *s, const Integrator *i, double t, double *y) {
     const int nq = s->system->nq, nv = s->system->nv;
     const double h = t - i->t, before = i->t - i->t_old;
     double *rate = i->scratch + 2 * i->ny;
-    if (before > 0 && h <= TOLD_APART * before) {
+    if (before > 0 && h <= FOLLOWED * before) {
         led_cubic(i->ny, i->y_old, i->f_old, i->y, i->f, before, 1 + h / before, y);
         return;
     }
@@ -120,9 +120,9 @@ static Status arrive_at(Solver *s, const Integrator *i, double t, double *y, dou
 
 /* Where the rows are as many as the speeds a crossing of branches within the step shows by the sign of their
  * determinant.  error_old remembers that of where a step begins: 1 for -1, 2 for 1, 0: not known. */
-static void note_sign(const Solver *s, Integrator *i) {
+static void note_sign(Solver *s, Integrator *i) {
     const Square *square = s->system->square;
-    const int sign = square == NULL ? 0 : square->sign((Linear *)&s->stepped.linear);
+    const int sign = square == NULL ? 0 : square->sign(&s->stepped.linear);
     i->error_old = sign == 0 ? 0 : sign < 0 ? 1 : 2;
 }
 
