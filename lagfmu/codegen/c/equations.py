@@ -257,7 +257,10 @@ class Tables:
         for name, values in tables.items():
             self.written += self._integers(f"block_{name}", values)
             members.append(f".{name} = {self.prefix}block_{name}")
-        members.append(f".count = {len(found)}")
+        members += [
+            f".count = {len(found)}",
+            f".small = {int(max(len(r) for r, _ in found) <= 12)}",
+        ]
         lines = "".join(f"    {member},\n" for member in members)
         self.written += f"static const Square {self.prefix}blocks = {{\n{lines}}};\n"
         self.fields["square"] = f"&{self.prefix}blocks"

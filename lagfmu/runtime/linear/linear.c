@@ -162,7 +162,7 @@ Status linear_factor_kept(Linear *l, const double *M, const double *G, const int
         l->rung = RUNG_WRITTEN_OUT; /* it factors and solves at once */
         return OK;
     }
-    if (all && l->system->square != NULL && !(l->off > 0) && l->system->square->factor(l)) {
+    if (all && l->system->square != NULL && l->system->square->small && !(l->off > 0) && l->system->square->factor(l)) {
         l->rung = RUNG_SQUARE;
         return OK;
     }

@@ -13,7 +13,7 @@ typedef struct Square {
     int (*factor)(Linear *l);
     void (*solve)(Linear *l, const double *b, const double *c, double *x, double *lambda);
     int (*sign)(Linear *l);
-    int count;
+    int count, small;          /* small: 1 if the blocks cost less than the elimination by the plan */
     const int *start;          /* (count + 1) where each block begins in: */
     const int *rows, *columns; /* (nv) those of the blocks, one block behind the other */
 } Square;
