@@ -38,9 +38,9 @@ class Method:
 
 MENU = (
     Method(
-        *("auto", 1, "dop853, but radau5 where it is stiff"),
-        "`dop853`, and `radau5` while stiffness holds it back; the log says when. Python target: `dop853`",
-        made_of=("dop853", "radau5"),
+        *("auto", 1, "dop853, but radau where it is stiff"),
+        "`dop853`, and `radau` while stiffness holds it back; the log says when. Python target: `dop853`",
+        made_of=("dop853", "radau"),
     ),
     Method(
         *("dop853", 2, "", "almost everything"),
@@ -59,7 +59,7 @@ MENU = (
         marker="D",
     ),
     Method(
-        *("radau5", 4, "stiff", "stiff springs and dampers"),
+        *("radau", 4, "stiff", "stiff springs and dampers: order 9; Python target: 5"),
         differentiated=True,
         tangents=True,
         colour="#6940a5",
@@ -78,7 +78,7 @@ MENU = (
 )
 INSTEAD = {  # SciPy's names, and a method that was offered once -> the one to take
     **dict.fromkeys(("dopri5", "RK23", "RK45", "DOP853"), "dop853"),
-    **dict.fromkeys(("Radau", "BDF"), "radau5"),
+    **dict.fromkeys(("radau5", "Radau", "BDF"), "radau"),
     "LSODA": "auto",
 }
 METHODS = tuple(m.name for m in MENU)

@@ -1,4 +1,4 @@
-"""Slider-crank that drags a load by a stiff, damped spring: a stiff system, solved by radau5.
+"""Slider-crank that drags a load by a stiff, damped spring: a stiff system, solved by radau.
 
 phi [rad] is the crank's angle, x and y [m] the slider and the load along its line, from the crank's
 axis; gravity does not act.  With f = (x - r cos phi)^2 + (r sin phi)^2 - l^2 the rod, which has no mass,
@@ -99,7 +99,7 @@ model = Model(
     ),
 )
 
-scenes = [Scene("SliderCrank", method="radau5", stop_time=1.0, step_size=0.01)]
+scenes = [Scene("SliderCrank", method="radau", stop_time=1.0, step_size=0.01)]
 
 # Geometry: the slider's place and speed are those of the crank's angle, on either side of the crank's
 # pin: it changes sides only where the rod stands across, at |sin(phi)| = l/r.

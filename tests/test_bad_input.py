@@ -476,7 +476,7 @@ def test_mass_that_vanishes_at_the_start_is_no_negative_one():
     ("change", "parts"),
     [
         ({"formulation": "maximal"}, ("'maximal'", "multipliers, nullspace, minimal")),
-        ({"method": "euler"}, ("'euler'", "dop853, rk4, radau5")),
+        ({"method": "euler"}, ("'euler'", "dop853, rk4, radau")),
         ({"stop_time": math.nan}, ("stop_time = nan", "positive")),
         ({"step_size": 0.0}, ("step_size = 0.0", "positive")),
         ({"tolerance": -1e-8}, ("tolerance = -1e-08", "positive")),
@@ -835,7 +835,7 @@ NO_STEPS = {
 }
 
 
-@pytest.mark.parametrize("method", ["dop853", "radau5", "rk4"])
+@pytest.mark.parametrize("method", ["dop853", "radau", "rk4"])
 def test_a_communication_step_that_cannot_be_done_is_refused(fmu, method):
     """fmi2Discard (fmi2Error where it can be returned and the call is illegal), with the reason in the
     log; nothing has changed, and the next step is done."""

@@ -216,9 +216,7 @@ def rescaled(path: Path, units: Sequence[float], stop: float, **settings: Any) -
 NANO, GIGA = 2.0**-30, 2.0**30  # 0.93e-9, 1.07e9: rounding is the same in both units
 BINARY = [(GIGA, 1, 1), (1, NANO, 1), (1, 1, GIGA), (NANO, 1, NANO), (NANO, GIGA, NANO)]
 DECADES = [(1e9, 1, 1), (1, 1e9, 1), (1, 1, 1e-9), (1e9, 1e-9, 1e9)]
-STIFF = (
-    "SliderCrank"  # the pivots of radau5's matrix are chosen by size, which is a matter of units
-)
+STIFF = "SliderCrank"  # the pivots of radau's matrix are chosen by size, which is a matter of units
 TABULATED = "HalfCar"  # the points of its road stay in metres
 FREE = of_each_kind(sorted(set(FILES) - {STIFF, TABULATED}))
 
@@ -269,14 +267,15 @@ def test_lambda_scales_as_its_unit_says(native_fmu, name):
 
 def test_a_stiff_system_scales_as_far_as_its_spring_lets_it(native_fmu):
     """The spring's pull is k = 1e6 N/m times a difference of two places of 0.6 m: rounding in them is
-    eps k y/|pull| of the force, and radau5 tells lambda in any unit to ten times that."""
+    eps k y/|pull| of the force, and radau, whose stages are transformed by factors up to 33, tells lambda in
+    any unit to twenty times that."""
     path = native_fmu(STIFF)
     plain = rescaled(path, (1, 1, 1), 0.5)
     pull = np.abs(plain["der(y,2)"]).max()
     rounding = np.finfo(float).eps * 1e6 * 0.6 / pull
     for units in DECADES:
         worst = apart(plain, rescaled(path, units, 0.5))
-        assert max(worst.values()) < 10 * rounding
+        assert max(worst.values()) < 20 * rounding
 
 
 def test_a_motion_is_as_quick_as_doubles_can_say(built):

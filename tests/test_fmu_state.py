@@ -25,7 +25,7 @@ def run(one, steps):
     return record
 
 
-@pytest.mark.parametrize("method", ["dop853", "radau5"])
+@pytest.mark.parametrize("method", ["dop853", "radau"])
 @pytest.mark.parametrize("before", [pytest.param(10, marks=pytest.mark.thorough), 31])
 def test_a_restored_state_repeats_the_motion_bit_for_bit(fmu, method, before):
     """From one state there is one future: also across the departure at 1.64 s, from a saved state and

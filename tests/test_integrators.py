@@ -155,12 +155,13 @@ def test_the_error_of_dop853_falls_with_the_tolerance_over_nine_decades(native_f
 
 
 @BOTH
-@pytest.mark.parametrize(("method", "finest"), [("radau5", 8)])
+@pytest.mark.parametrize(("method", "finest"), [("radau", 10)])
 def test_the_error_of_the_other_methods_falls_with_the_tolerance(native_fmu, name, method, finest):
-    """A hundredth of the tolerance makes the error of radau5 at least 10 times smaller."""
+    """From 1e-4, where it is 2e-5, a hundredth of the tolerance makes the error of radau at least 10 times
+    smaller."""
     errors = [
         largest_error(native_fmu(name), tolerance=10.0**-k, solver_method=method)
-        for k in range(2, finest + 1, 2)
+        for k in range(4, finest + 1, 2)
     ]
     assert (np.array(errors[:-1]) / errors[1:] > 10).all()
     assert errors[-1] < 100 * 10.0**-finest

@@ -255,15 +255,15 @@ def test_a_start_value_that_is_moved_says_so(opened: Opened) -> None:
 
 
 def test_another_method_is_another_run(opened: Opened) -> None:
-    """The menu of methods is the FMU's: radau5 takes other steps, and says so."""
+    """The menu of methods is the FMU's: radau takes other steps, and says so."""
     page = opened("PendulumCartesian")
     page.until("lagfmu.runs")
     script = "() => lagfmu.shown().values['solver.steps'].at(-1)"
     steps, before = page.tab.evaluate(script), page.until("lagfmu.runs")
-    page.tab.locator("#method").select_option("radau5")
+    page.tab.locator("#method").select_option("radau")
     page.until(f"lagfmu.runs > {before}")
     assert page.tab.evaluate(script) != steps
-    assert page.tab.evaluate("() => lagfmu.shown().settings.method") == "radau5"
+    assert page.tab.evaluate("() => lagfmu.shown().settings.method") == "radau"
 
 
 def test_the_page_goes_on_while_the_fmu_computes(opened: Opened) -> None:

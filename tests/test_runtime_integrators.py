@@ -5,12 +5,14 @@ from __future__ import annotations
 import ctypes
 import itertools
 import math
+import re
 from collections.abc import Sequence
 
 import mpmath
 import numpy as np
 import pytest
-from runtime import compile_library
+import radau
+from runtime import RUNTIME_FILES, compile_library
 from scipy.integrate import DOP853
 
 SOURCES = (
@@ -20,7 +22,7 @@ SOURCES = (
     "refused_step.c",
     "dop853.c",
     "rk4.c",
-    "radau5.c",
+    "radau.c",
     "lu.c",
     "digits.c",
 )
@@ -98,8 +100,8 @@ static Status jacobian(void *context, double t, const double *y, double *J, doub
     return OK;
 }
 
-SHARED const Method dop853, rk4, radau5;
-static const Method *const METHODS[] = {&dop853, &rk4, &radau5};
+SHARED const Method dop853, rk4, radau;
+static const Method *const METHODS[] = {&dop853, &rk4, &radau};
 
 Run *run_new(int method, int problem, int ny, const double *y, double t, double h) {
     Run *r = calloc(1, sizeof *r);
@@ -162,9 +164,9 @@ void run_restore(Run *r, const char *memory, const double *x) {
     memset(r->scratch.base, 0xa5, r->scratch.used);
 }
 """
-METHODS = ("dop853", "rk4", "radau5")
-ADAPTIVE = ("dop853", "radau5")
-ORDER = {"dop853": 8, "rk4": 4, "radau5": 5}
+METHODS = ("dop853", "rk4", "radau")
+ADAPTIVE = ("dop853", "radau")
+ORDER = {"dop853": 8, "rk4": 4, "radau": 9}
 SIZES = (4, 2, 1, 1, 2, 2, 4)
 ELLIPTIC, VAN_DER_POL, ESCAPE, ROOT, CIRCLE, KINK, CHEAP = range(7)
 POINTER, DOUBLE, INT = ctypes.c_void_p, ctypes.c_double, ctypes.c_int
@@ -306,14 +308,33 @@ def test_order(library: ctypes.CDLL, method: str, t: float, counts: tuple[int, .
     assert slope == pytest.approx(ORDER[method], abs=0.15)
 
 
-def test_order_of_radau5(library: ctypes.CDLL) -> None:
-    """y' = y^2, y = 1/(1 - t): the error of n equal steps falls as h^5."""
-    counts, errors = (16, 24, 32, 48, 64), []
+def test_order_of_radau(library: ctypes.CDLL) -> None:
+    """y'' = -y over six radians: the error of n equal steps falls as h^9."""
+    counts, errors = (5, 6, 8, 10, 12), []
     for n in counts:
-        r = Run(library, "radau5", ESCAPE, [1.0], tolerance=1e-7, h=0.5 / n)
-        fixed_steps(r, 0.5, n)
-        errors.append(abs(r.y[0] - 2))
-    assert observed_order([1 / n for n in counts], errors) == pytest.approx(5, abs=0.15)
+        r = Run(library, "radau", CIRCLE, [1.0, 0.0], tolerance=1e-5, h=6 / n)
+        fixed_steps(r, 6, n)
+        errors.append(abs(r.y - [math.cos(6), -math.sin(6)]).max())
+    assert observed_order([1 / n for n in counts], errors) == pytest.approx(9, abs=0.15)
+
+
+def test_tables_of_radau() -> None:
+    """Its tables are those of collocation at Radau's five nodes: A satisfies the conditions of
+    order 5 of the stages and of order 9 of the step, and A^-1 = T L T^-1."""
+    t, text = radau.tableau(5), RUNTIME_FILES["radau.c"].read_text("utf-8")
+    for name in ("C", "L", "T", "T_INVERSE", "P"):
+        (table,) = re.findall(rf"double {name}\[[^=]*= (.*?);", text, re.DOTALL)
+        told = [mpmath.mpf(x) for x in re.findall(r"-?[\d.]+", table)]
+        assert told == pytest.approx(list(getattr(t, name)), rel=1e-15, abs=1e-19)
+    with mpmath.workdps(30):
+        for i, k in itertools.product(range(5), range(1, 10)):
+            if k <= 5 or i == 4:
+                integral = sum(t.A[i, j] * t.C[j] ** (k - 1) for j in range(5))
+                assert abs(integral - t.C[i] ** k / k) < 1e-25
+        L = mpmath.diag([t.L[k] for k in (0, 1, 1, 3, 3)])
+        for k in (1, 3):
+            L[k + 1, k], L[k, k + 1] = t.L[k + 1], -t.L[k + 1]
+        assert mpmath.norm(t.T * L * t.T_INVERSE * t.A - mpmath.eye(5)) < 1e-25
 
 
 @pytest.mark.parametrize(
@@ -321,13 +342,13 @@ def test_order_of_radau5(library: ctypes.CDLL) -> None:
     [
         ("dop853", 7, (32, 48, 64, 80), 1e30),
         ("rk4", 3, (32, 64, 128), 1e30),
-        ("radau5", 3, (128, 256, 512), 1e-1),
+        ("radau", 5, (32, 48, 64, 96), 1e-8),
     ],
 )
 def test_order_of_dense_output(
     library: ctypes.CDLL, method: str, order: int, counts: tuple[int, ...], tolerance: float
 ) -> None:
-    """Within one step from an exact state the interpolation's error falls as h^(q + 1): q = 7, 3, 3."""
+    """Within one step from an exact state the interpolation's error falls as h^(q + 1): q = 7, 3, 5."""
     errors = []
     for n in counts:
         h = 6 / n
@@ -570,14 +591,14 @@ def test_failure_at_the_start_names_its_cause(library: ctypes.CDLL, method: str)
 
 def test_van_der_pol(library: ctypes.CDLL) -> None:
     """mu = 1e6, two relaxation jumps (Hairer & Wanner II, sect. IV.10): the error follows the
-    tolerance from 1e-3 to 1e-12, and the steps its sixth root, as those of a method of order 5 do."""
+    tolerance from 1e-3 to 1e-12, and the steps the sixth root of tol^(2/3), as of an estimate of order 5."""
     exact = np.array([1.7061677321704830, -0.89280970102479750])
     errors, steps, tolerances = [], [], [10.0**-k for k in range(3, 13)]
     for tolerance in tolerances:
-        r = Run(library, "radau5", VAN_DER_POL, [2.0, 0.0], tolerance=tolerance)
+        r = Run(library, "radau", VAN_DER_POL, [2.0, 0.0], tolerance=tolerance)
         steps.append(r.to(2.0))
         errors.append(abs(r.y / exact - 1).max())
         assert errors[-1] < 100 * tolerance
     assert all(b < a for a, b in itertools.pairwise(errors))
     assert 0 < steps[0] < 250
-    assert observed_order(tolerances[4:], steps[4:]) == pytest.approx(-1 / 6, abs=0.01)
+    assert observed_order(tolerances[4:], steps[4:]) == pytest.approx(-1 / 9, abs=0.01)

@@ -64,7 +64,7 @@ def wire(tmp_path_factory) -> tuple[Path, Tradeoff]:
 def swing(tmp_path_factory) -> tuple[Path, Tradeoff]:
     """The Cartesian pendulum, whose motion in time stands in no closed form of its file."""
     fmu = built("pendulum", SWING, tmp_path_factory.mktemp("swing"))
-    plan = Plan(0.1, (1e-4, 1e-7, 1e-10), ("dop853", "radau5"), repeats=1)
+    plan = Plan(0.1, (1e-4, 1e-7, 1e-10), ("dop853", "radau"), repeats=1)
     return fmu, measure(fmu, plan)
 
 
@@ -166,7 +166,7 @@ def test_the_command_writes_table_file_and_figure(tmp_path):
     model.write_text("from lagfmu import Output, multiplier\n" + text)
     text = lagfmu(
         *("tradeoff", model, "--scene", "Link", "--out", out, "--repeats", 2, "--target", "python"),
-        *("--tolerance", 1e-4, "--method", "dop853", "--method", "radau5", "--step-size", 0.02),
+        *("--tolerance", 1e-4, "--method", "dop853", "--method", "radau", "--step-size", 0.02),
         *("--json", file),
     )
     assert "Link (python), every 0.02 s" in text
@@ -319,9 +319,9 @@ def test_a_fixed_step_is_halved_until_it_holds():
 
 def test_what_nothing_holds_is_refused_with_the_best_that_was_reached():
     """The message names the setting, its error and the output that is worst."""
-    scene = replace(SHORT, method="radau5")
+    scene = replace(SHORT, method="radau")
     with pytest.raises(
-        BuildError, match=r"best on the scene is radau5 \de-1\d: .*e-1\d of lambda\.rod"
+        BuildError, match=r"best on the scene is radau \de-1\d: .*e-1\d of lambda\.rod"
     ):
         choose(PENDULUM.model, scene, Goal(1e-15, ("lambda.rod",)), target="native")
 

@@ -27,7 +27,7 @@ from .projection import project_positions, project_velocities
 from .state import Settings, State
 from .switch import at_event, begun
 
-INTEGRATORS = {"auto": DOP853, "dop853": DOP853, "radau5": Radau}
+INTEGRATORS = {"auto": DOP853, "dop853": DOP853, "radau": Radau}
 HEADWAY = 1e-6  # of the natural time: shorter steps are counted
 PATIENCE = 200  # steps after which a communication step is judged by its average step, ...
 STEP_LIMIT = 1e6  # ... and the steps that it may need in all

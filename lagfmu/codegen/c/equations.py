@@ -361,7 +361,7 @@ def model_source(
 ) -> str:
     """C text that defines MODEL_SYSTEM, the numeric form of the equations.
 
-    `tangents`: with the derivatives that directional derivatives and radau5 need; `by`: parameters by which
+    `tangents`: with the derivatives that directional derivatives and radau need; `by`: parameters by which
     they are taken as well; `grouped`: with the groups of their columns, for FMI 3.0; `led`: nothing may be
     left to integrate.
 

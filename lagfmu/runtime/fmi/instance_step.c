@@ -43,7 +43,7 @@ static void move_inputs(Instance *x, double t) {
     drive->since = t;
 }
 
-/* Of `auto`: why radau5 took over, the first time; then each change that a communication step ends with. */
+/* Of `auto`: why radau took over, the first time; then each change that a communication step ends with. */
 static void tell_of_method(Instance *x, double product, int implicit) {
     const Choice *c = &x->solver.state.now.choice;
     if (product == 0 && c->product > 0) {
@@ -53,7 +53,7 @@ static void tell_of_method(Instance *x, double product, int implicit) {
     }
     if (implicit == c->implicit) return;
     (void)snprintf(x->note, sizeof x->note, "at t = %s s: going on with %s again",
-                   digits(x->solver.state.now.t).text, c->implicit ? "radau5" : "dop853");
+                   digits(x->solver.state.now.t).text, c->implicit ? "radau" : "dop853");
     x->tell(x->context, NOTE_EVENT, x->note);
 }
 

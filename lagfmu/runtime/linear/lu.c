@@ -62,15 +62,20 @@ int lu_factor_complex(int n, double *A_re, double *A_im, int *pivots) {
             }
         double p_re = A_re[k * n + k], p_im = A_im[k * n + k];
         double square = p_re * p_re + p_im * p_im;
+        int *places = pivots + k + 1, count = 0; /* what is not zero in the row of the pivot; later pivots come there */
+        for (int j = k + 1; j < n; j++)
+            if (A_re[k * n + j] != 0 || A_im[k * n + j] != 0) places[count++] = j;
         for (int i = k + 1; i < n; i++) {
-            double a_re = A_re[i * n + k], a_im = A_im[i * n + k];
+            double *re = A_re + i * n, *im = A_im + i * n, a_re = re[k], a_im = im[k];
+            if (a_re == 0 && a_im == 0) continue;
             double f_re = (a_re * p_re + a_im * p_im) / square;
             double f_im = (a_im * p_re - a_re * p_im) / square;
-            A_re[i * n + k] = f_re;
-            A_im[i * n + k] = f_im;
-            for (int j = k + 1; j < n; j++) {
-                A_re[i * n + j] -= f_re * A_re[k * n + j] - f_im * A_im[k * n + j];
-                A_im[i * n + j] -= f_re * A_im[k * n + j] + f_im * A_re[k * n + j];
+            re[k] = f_re;
+            im[k] = f_im;
+            for (int l = 0; l < count; l++) {
+                const int j = places[l];
+                re[j] -= f_re * A_re[k * n + j] - f_im * A_im[k * n + j];
+                im[j] -= f_re * A_im[k * n + j] + f_im * A_re[k * n + j];
             }
         }
     }

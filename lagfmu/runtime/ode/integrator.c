@@ -7,7 +7,7 @@ void integrator_layout(Integrator *i, Arena *saved, Arena *scratch, int ny, int 
     for (int k = 0; k < count; k++) {
         const Method *method = methods[k];
         if (method == NULL) continue;
-        const int matrices = watched <= RADAU5_MOST_STATES ? method->scratch_matrices : 0;
+        const int matrices = watched <= RADAU_MOST_STATES ? method->scratch_matrices : 0;
         const int more = method->scratch_arrays * ny + matrices * watched * watched, pivots = matrices * watched;
         if (method->dense_arrays > dense) dense = method->dense_arrays;
         if (more > doubles) doubles = more;

@@ -3,7 +3,7 @@
  * Each method is a file with its tableau's source, which defines a Method (one
  * that steps a mechanical system, not an ODE, fills the same Integrator).  Error weights: an
  * accepted step has a root-mean-square error below 1 in units of tolerance * max(|y_i|, scale_i);
- * radau5's estimate is of low order: it is kept below 0.1 tolerance^(2/3), so that the error is. */
+ * radau's estimate is of lower order: it is kept below 0.1 tolerance^(2/3), so that the error is. */
 #ifndef LAGFMU_INTEGRATOR_H
 #define LAGFMU_INTEGRATOR_H
 
@@ -15,7 +15,7 @@ typedef struct {
     void *context;
     /* f(t, y); FAILED where it cannot be evaluated: the step is cut there, the cause is in `why` */
     Status (*rate)(void *context, double t, const double *y, double *dydt);
-    /* J = df/dy of the components that are watched (n), dense, row by row (n * n), and df/dt (n); for radau5.  The
+    /* J = df/dy of the components that are watched (n), dense, row by row (n * n), and df/dt (n); for radau.  The
      * others, if there are any, are blocks of n with x' = J x + ... of their own. */
     Status (*jacobian)(void *context, double t, const double *y, double *J, double *dfdt);
     Why *why;
@@ -53,7 +53,7 @@ struct Method {
     const char *name;
     int dense_arrays;                 /* arrays of ny doubles in `dense` */
     int scratch_arrays;               /* arrays of ny doubles in `scratch`, */
-    int scratch_matrices;             /* and of watched^2, with as many pivots each, of RADAU5_MOST_STATES at most */
+    int scratch_matrices;             /* and of watched^2, with as many pivots each, of RADAU_MOST_STATES at most */
     int last_stage; /* arrays in `dense` before two of a stage at t, its argument and its rate, which
                      * stay as they are; 0: they are not kept */
     int coarse;                       /* dense() has fewer digits than the step: to search by, not to be read */
@@ -80,7 +80,7 @@ struct Method {
     double (*error)(const Integrator *i, int component);
 };
 
-enum { RADAU5_MOST_STATES = 800 }; /* for which radau5 keeps dense matrices */
+enum { RADAU_MOST_STATES = 800 }; /* for which radau keeps dense matrices */
 
 /* Takes memory for any of `count` methods (NULL: none) from the arena.  The arrays that must be saved (y, f, y_old,
  * f_old, dense) come from `saved`, the scratch from `scratch`. */

@@ -13,7 +13,7 @@
  * tolerance stops an explicit method before its stability does, by terms h^p (h rho)^k of its error.
  * An oscillation that has to be resolved is part of the motion: there rho = sigma.
  *
- * After 15 stiff steps without 6 others in a row radau5 takes over.  Where its steps are not longer by
+ * After 15 stiff steps without 6 others in a row radau takes over.  Where its steps are not longer by
  * what they cost, dop853 comes back, and more stiff steps are asked for the next time; from time to
  * time it is tried again, since only its own steps show that the stiffness is gone. */
 #include "stiffness.h"
@@ -31,11 +31,11 @@ enum {
     STIFF_EVERY = 3,  /* steps of dop853 of which one is judged while none was stiff */
     STIFF_STEPS = 15, /* steps that decide, ... */
     STIFF_OTHER = 6,  /* ... and others in a row after which they are counted anew */
-    STIFF_BRIEF = 6,  /* steps of radau5 in a row that do not pay, after which dop853 comes back */
-    STIFF_RETRY = 128 /* steps of radau5 before dop853 is tried again; twice as many each time */
+    STIFF_BRIEF = 6,  /* steps of radau in a row that do not pay, after which dop853 comes back */
+    STIFF_RETRY = 128 /* steps of radau before dop853 is tried again; twice as many each time */
 };
 
-/* Cost of a step of radau5 in steps of dop853: as measured for 4 to 64 states; the matrices are dense. */
+/* Cost of a step of radau in steps of dop853: as measured for 4 to 64 states; the matrices are dense. */
 static double price(int ny) { return 1 + ny / 8.0 + (double)ny * ny / 170; }
 
 typedef struct {
@@ -83,7 +83,7 @@ void stiffness_explicit_step(Choice *c, const Integrator *i, Magnitudes of) {
     c->longest = c->stiff > 0 ? fmax(h, c->longest) : h;
     c->stiff += c->stiff < enough;
     c->other = 0;
-    if (c->stiff < enough || i->ny > RADAU5_MOST_STATES) return;
+    if (c->stiff < enough || i->ny > RADAU_MOST_STATES) return;
     c->turn = 1;
     if (c->product > 0) return;
     c->time = i->t;
@@ -127,7 +127,7 @@ void stiffness_message(const Choice *c, char *text, size_t size) {
         (void)snprintf(slower, sizeof slower, ", which is %.3g times slower", c->ratio);
     (void)snprintf(text, size,
                    "stiff at t = %s s: dop853's steps are bound by the fastest rate rho in the "
-                   "equations, h rho = %.3g, and not by the motion%s: going on with radau5 "
-                   "(solver.method = radau5 saves the detection, dop853 forbids the change)",
+                   "equations, h rho = %.3g, and not by the motion%s: going on with radau "
+                   "(solver.method = radau saves the detection, dop853 forbids the change)",
                    digits(c->time).text, c->product, slower);
 }

@@ -186,7 +186,7 @@ static void choose_method(Solver *s) {
     restart(s, i->t, y, choice->longest);
 }
 
-/* Where radau5 fails, dop853 goes on; where the constraints alone do not lead on, the chosen method does. */
+/* Where radau fails, dop853 goes on; where the constraints alone do not lead on, the chosen method does. */
 static Status take_step(Solver *s, double t_end) {
     if (s->settings.method == AUTO && !s->state.now.led) choose_method(s);
     const double t = s->integrator.t;

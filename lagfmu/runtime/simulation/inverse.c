@@ -20,7 +20,7 @@
 static const double HELD_AGAINST = 0.382; /* of the step: where the cubic is held against f; in its middle a motion of the
                                            * step's period is on it */
 static const double BRANCH = 1e-3;        /* of the coordinates */
-static const double LOOKED_AT = 0.1;      /* times tolerance^(2/3), as radau5, whose dense output serves to search, too */
+static const double LOOKED_AT = 0.1;      /* times tolerance^(2/3), as radau, whose dense output serves to search, too */
 static const double TURNS = 0.1;          /* [rad] of a step, and parts of sizes, by which rows turn little */
 static const double FOLLOWED = 2;         /* steps before, so far the cubic is followed beyond it */
 static const double INVERSE_SAFE = 0.9, INVERSE_LEAST = 0.2, INVERSE_MOST = 5; /* of the step's change */

@@ -3,11 +3,11 @@
 
 #include "feature.h"
 
-SHARED const Method dop853, rk4, radau5, rattle, inverse_dynamics;
+SHARED const Method dop853, rk4, radau, rattle, inverse_dynamics;
 
 SHARED_VALUE const Optional OPTIONAL = {
-    .methods = {&inverse_dynamics, &dop853, &dop853, &rk4, &radau5, &rattle}, /* in the order of lagfmu/methods.py */
-    .implicit = &radau5,
+    .methods = {&inverse_dynamics, &dop853, &dop853, &rk4, &radau, &rattle}, /* in the order of lagfmu/methods.py */
+    .implicit = &radau,
     .led = inverse_dynamics_applies,
     .events = &EVENTS,
     .contacts = &CONTACTS,
