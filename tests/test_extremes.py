@@ -267,8 +267,8 @@ def test_lambda_scales_as_its_unit_says(native_fmu, name):
 
 def test_a_stiff_system_scales_as_far_as_its_spring_lets_it(native_fmu):
     """The spring's pull is k = 1e6 N/m times a difference of two places of 0.6 m: rounding in them is
-    eps k y/|pull| of the force, and radau, whose stages are transformed by factors up to 33, tells lambda in
-    any unit to twenty times that."""
+    eps k y/|pull| of the force, and what radau's iterations leave is as much again: it tells lambda in any
+    unit to twenty times that, to ten where a hundredth is left."""
     path = native_fmu(STIFF)
     plain = rescaled(path, (1, 1, 1), 0.5)
     pull = np.abs(plain["der(y,2)"]).max()
