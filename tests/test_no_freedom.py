@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from math import ceil, cos, pi, sin, sqrt
+from math import acos, atan2, ceil, cos, hypot, pi, remainder, sin, sqrt
 from typing import Any
 
 import numpy as np
@@ -12,9 +12,11 @@ import pytest
 from conftest import model_file
 from instance import Instance, instance
 from sympy import Piecewise, symbols
+from sympy import cos as cosine
 from sympy import sin as sine
+from sympy.physics.mechanics import dynamicsymbols
 
-from lagfmu import Model, Parameter, Peak, Scene, simulate
+from lagfmu import Holonomic, Model, Parameter, Peak, Scene, simulate
 from lagfmu.bodies import Body, Distance, Gravity, Ground, Motor, Prismatic, Revolute, mechanism
 from lagfmu.errors import SimulationError
 from lagfmu.testing import TIME, prepare, sources_of
@@ -39,7 +41,7 @@ def slider_crank(
 ) -> Model:
     """A crank of 0.2 m whose motor moves it, a rod, a piston on the x axis; `twice`: a second
     rod without mass."""
-    more = [Distance("again", crank.at((R / 2, 0)), piston.at((0, 0)), L)] if twice else []
+    more = [Distance("again", crank.at((R / 2, 0)), piston.at((0, 0)), long)] if twice else []
     return mechanism(
         "Driven",
         plane="xy",
@@ -245,3 +247,106 @@ def test_an_arm_of_fmi3_moves_as_that_of_fmi2(built: Any) -> None:
     for name in runs[0].dtype.names:
         if name.startswith(("force.", "torque.", "angle.")):
             assert (runs[0][name] == runs[1][name]).all()
+
+
+def rocker(a: float) -> tuple[float, float]:
+    """Angles of coupler and rocker of an open four-bar (0.2, 0.5, 0.4, base 0.5 m) at the crank's a."""
+    x, y = 0.5 - 0.2 * cos(a), -0.2 * sin(a)
+    far = hypot(x, y)
+    b = atan2(y, x) + acos((0.5**2 + far**2 - 0.4**2) / (far))
+    return b, atan2(0.2 * sin(a) + 0.5 * sin(b), 0.2 * cos(a) + 0.5 * cos(b) - 0.5)
+
+
+@pytest.mark.parametrize("step", [0.2, 1.0])
+def test_a_four_bar_stays_open_however_far_its_crank_has_turned(step: float, built: Any) -> None:
+    """80 turns on, coupler and rocker stand where the crank says, to rounding of its angle.  An angle's size
+    is 1 rad, not how far it has gone: beside that the crossed linkage was near enough after 50 turns."""
+    a, b, c = dynamicsymbols("a b c")
+    coupler, rocks = rocker(0.0)
+    model = Model(
+        name="OpenFourBar",
+        lagrangian=sum(0.01 * x.diff() ** 2 for x in (a, b, c)) * symbols("J", positive=True),
+        coordinates={a: "rad", b: "rad", c: "rad"},
+        constraints=[
+            Holonomic("x", 0.2 * cosine(a) + 0.5 * cosine(b) - 0.4 * cosine(c) - 0.5),
+            Holonomic("y", 0.2 * sine(a) + 0.5 * sine(b) - 0.4 * sine(c)),
+            Holonomic("motor", a - w * TIME),
+        ],
+        parameters=[
+            Parameter(w, 10.0, "rad/s"),
+            Parameter(symbols("J", positive=True), 1, "kg.m^2"),
+        ],
+        start={a: 0, b: coupler, c: rocks, a.diff(): 10.0},
+    )
+    with instance(built(model)) as one:
+        one.start()
+        for seen in walked(one, step, 50.0):
+            expected = rocker(10.0 * seen["time"])
+            for name, angle in zip("bc", expected, strict=True):
+                assert abs(remainder(seen[name] - angle, 2 * pi)) < 1e-9
+
+
+@pytest.mark.parametrize("longer", [1e-3, 1e-6])
+@pytest.mark.parametrize("twice", [False, True])
+def test_a_rod_nearly_as_long_as_the_crank_turns_the_piston_round(
+    longer: float, twice: bool, built: Any
+) -> None:
+    """It comes within 0.4 sqrt(longer) m of the branch on which the piston stays in the origin, and does not
+    take it, whatever the communication step; with a second rod no determinant tells."""
+    long = R * (1 + longer)
+    model = slider_crank(
+        long=long,
+        twice=twice,
+        parameters=[Parameter(w, 2 * pi, "rad/s")],
+        start={"angle.A": 0.0, "der(angle.A)": 2 * pi},
+    )
+    with instance(built(model)) as one:
+        one.start()
+        for seen in walked(one, 0.37 if longer > 1e-4 else 0.1, 2.22):
+            a = 2 * pi * seen["time"]
+            x = R * cos(a) + sqrt(long**2 - (R * sin(a)) ** 2)
+            assert seen["position.D"] == pytest.approx(x, abs=1e-8 / sqrt(longer))
+
+
+def test_a_peak_is_seen_where_a_step_is_many_turns(built: Any) -> None:
+    """A pendulum that a motor turns eight times a second asks it for m g r at most, and for as much the other
+    way, also where it is looked at once a second and the cubic is the motion."""
+    a = dynamicsymbols("a")
+    m, g, r = symbols("m g r", positive=True)
+    model = Model(
+        name="TurnedPendulum",
+        lagrangian=m * r**2 * a.diff() ** 2 / 2 - m * g * r * sine(a),
+        coordinates={a: "rad"},
+        constraints=[Holonomic("motor", a - w * TIME)],
+        parameters=[
+            Parameter(m, 1.0, "kg"),
+            Parameter(g, 9.81, "m/s^2"),
+            Parameter(r, 0.5, "m"),
+            Parameter(w, 16 * pi, "rad/s"),
+        ],
+        start={a: 0, a.diff(): 16 * pi},
+        outputs=[Peak("lambda.motor")],
+    )
+    with instance(built(model)) as one:
+        one.start()
+        one.step(1.0)
+        seen = one.outputs()
+    assert seen["peak.lambda.motor.max"] == pytest.approx(4.905, rel=1e-9)
+    assert seen["peak.lambda.motor.min"] == pytest.approx(-4.905, rel=1e-9)
+
+
+def test_a_communication_point_on_a_crossing_costs_no_steps(built: Any) -> None:
+    """Crank and rod of one length, a point at each quarter of a turn: the steps after it are as long as those
+    after any other, and the passage is told once."""
+    model = slider_crank(
+        long=R,
+        parameters=[Parameter(w, 2 * pi, "rad/s")],
+        start={"angle.A": 0.0, "der(angle.A)": 2 * pi},
+    )
+    with instance(built(model)) as one:
+        one.start()
+        walked(one, 0.25, 0.5)
+        passages = [text for _, _, text in one.log if "singular" in text]
+        steps = one.get("solver.steps")
+    assert len(passages) == 1
+    assert steps < 100

@@ -12,6 +12,7 @@
 
 #include "feature.h"
 #include "indicators.h"
+#include "nominals.h"
 #include "optional.h"
 #include "segment.h"
 #include "square.h"
@@ -20,8 +21,13 @@
 static const double HELD_AGAINST = 0.382; /* of the step: where the cubic is held against f; in its middle a motion of the
                                            * step's period is on it */
 static const double BRANCH = 1e-3;        /* of the coordinates */
+static const double LED_ROUNDING = 0x1p-48; /* of a coordinate: no miss */
+static const double CROSSED = 1e-9;       /* of the coordinates, where the determinant changes its sign: branches that only
+                                           * come near each other lie that far apart, or are taken for one that crosses */
+static const double NARROWED = 0.1;       /* angle [rad] of rows: as where a passage is looked for; no sign tells of it */
 static const double LOOKED_AT = 0.1;      /* times tolerance^(2/3), as radau, whose dense output serves to search, too */
 static const double TURNS = 0.1;          /* [rad] of a step, and parts of sizes, by which rows turn little */
+static const double WATCHED = 1;          /* [rad] of a step in which something is looked at */
 static const double FOLLOWED = 2;         /* steps before, so far the cubic is followed beyond it */
 static const double INVERSE_SAFE = 0.9, INVERSE_LEAST = 0.2, INVERSE_MOST = 5; /* of the step's change */
 enum { APPROACHES = 3 };                  /* simplified Newton steps before the projection, at most */
@@ -78,31 +84,37 @@ static void approach(Solver *s, double t, double *y) {
     }
 }
 
-/* The largest magnitude of the coordinates of j's dimension. */
-static double led_size(const Solver *s, const double *q, int j) {
+/* What a coordinate's miss is held against, however far the motion has led: of angles 1 rad, of others the largest
+ * parameter in their rows, or in those of others of their dimension; where no row tells one, the largest coordinate. */
+static double led_size(const Solver *s, const double *extent, const double *q, int j) {
     const System *system = s->system;
-    double most = 0;
-    for (int k = 0; k < system->nq; k++)
-        if (system->dimension[k] == system->dimension[j]) most = fmax(most, fmax(fabs(q[k]), s->state.size[k]));
-    return most;
+    double told = 0, most = 0;
+    if (system->dimension[j] == system->angles) return 1;
+    if (extent[j] > 0) return extent[j];
+    for (int k = 0; k < system->nq; k++) {
+        if (system->dimension[k] != system->dimension[j]) continue;
+        told = fmax(told, extent[k]);
+        most = fmax(most, fmax(fabs(q[k]), s->state.size[k]));
+    }
+    return told > 0 ? told : most;
 }
 
 /* By how much the cubic from i to (t, y), whose q' is in `rate`, misses f = offset, of the coordinates. */
 static Status find_miss(Solver *s, const Integrator *i, double t, const double *y, const double *rate, double *miss) {
     Mechanism *b = &s->stepped;
     const int nq = s->system->nq;
-    double *q = i->scratch + 2 * i->ny, *on = q + nq;
+    double *q = i->scratch + 2 * i->ny, *on = q + nq, *extent = on + nq;
     const double h = t - i->t;
     const Instant at = segment_instant(s, i->t + HELD_AGAINST * h);
     led_cubic(nq, i->y, i->f, y, rate, h, HELD_AGAINST, q);
     if (find_way(s, at, q) != OK) return FAILED;
     memcpy(on, q, (size_t)nq * sizeof *q);
     mechanism_move(b, 1, b->dq, on);
+    nominals_extents(s->system, s->p, extent);
     *miss = 0;
     for (int j = 0; j < nq; j++) {
         const double off = fabs(on[j] - q[j]);
-        if (off <= *miss * fmax(fabs(q[j]), s->state.size[j])) continue;
-        *miss = fmax(*miss, off / led_size(s, q, j));
+        if (off > LED_ROUNDING * fabs(q[j])) *miss = fmax(*miss, off / led_size(s, extent, q, j));
     }
     return OK;
 }
@@ -120,10 +132,10 @@ static Status arrive_at(Solver *s, const Integrator *i, double t, double *y, dou
 
 /* Where the rows are as many as the speeds a crossing of branches within the step shows by the sign of their
  * determinant.  error_old remembers that of where a step begins: 1 for -1, 2 for 1, 0: not known. */
-static void note_sign(Solver *s, Integrator *i) {
+static double sign_there(Solver *s) {
     const Square *square = s->system->square;
     const int sign = square == NULL ? 0 : square->sign(&s->stepped.linear);
-    i->error_old = sign == 0 ? 0 : sign < 0 ? 1 : 2;
+    return sign == 0 ? 0 : sign < 0 ? 1 : 2;
 }
 
 /* Otherwise rows tell by which it is narrow at an end of the step, if they turn little on the way: so long. */
@@ -138,36 +150,54 @@ static double longest_turn(const Solver *s, const Integrator *i) {
     return rate > 0 ? TURNS / rate : HUGE_VAL;
 }
 
+/* What is looked at may go round with an angle that the cubic follows over any number of turns: steps to take at least. */
+static double turns_taken(const Solver *s, const Integrator *i, const double *y) {
+    const System *system = s->system;
+    double most = 0;
+    for (int j = 0; j < system->nq; j++)
+        if (system->dimension[j] == system->angles) most = fmax(most, fabs(y[j] - i->y[j]) / WATCHED);
+    return most;
+}
+
+static int is_watched(const Solver *s) {
+    return indicators_count(s->system) > 0 || features_everywhere(s) || s->state.now.approach.near;
+}
+
 static double allowed_miss(const Solver *s) {
     const double tolerance = s->settings.tolerance;
-    const int seen = indicators_count(s->system) > 0 || features_everywhere(s) || s->state.now.approach.near;
-    return seen ? LOOKED_AT * step_size_root(tolerance * tolerance, 3) : BRANCH;
+    return is_watched(s) ? LOOKED_AT * step_size_root(tolerance * tolerance, 3) : BRANCH;
 }
 
 static Status inverse_step(Integrator *i, const Ode *ode, const Control *control, double t_bound) {
     Solver *s = ode->context;
     const double allowed = allowed_miss(s);
-    double *y = i->scratch, factor = INVERSE_MOST;
+    double *y = i->scratch, factor = INVERSE_MOST, sign = 0;
+    int crossed = 0;
+    const int narrowed = s->system->square == NULL && OPTIONAL.passage != NULL;
     Trial trial;
     t_bound = fmin(t_bound, i->t + longest_turn(s, i));
     if (!(i->h_next > 0)) i->h_next = t_bound - i->t;
     if (trial_begin(&trial, i, ode, control, t_bound, 3) != OK) return FAILED;
     for (;;) {
-        double miss = HUGE_VAL;
+        double miss = HUGE_VAL, most = allowed;
         trial.unevaluated = arrive_at(s, i, trial.t_new, y, &miss) != OK;
-        if (miss > 0) factor = fmin(fmax(INVERSE_SAFE * step_size_root(fmin(allowed / miss, 1e4), 4), INVERSE_LEAST), INVERSE_MOST);
-        if (miss <= allowed) break;
+        sign = trial.unevaluated ? 0 : sign_there(s);
+        crossed = i->error_old > 0 && sign > 0 && sign != i->error_old;
+        if (crossed || (narrowed && s->stages.apart < NARROWED)) most = fmin(most, CROSSED);
+        if (miss > 0) factor = fmin(fmax(INVERSE_SAFE * step_size_root(fmin(most / miss, 1e4), 4), INVERSE_LEAST), INVERSE_MOST);
+        const double turns = miss <= most && is_watched(s) ? turns_taken(s, i, y) : 0;
+        if (turns > 1) factor = fmin(factor, INVERSE_SAFE / turns);
+        else if (miss <= most) break;
         if (trial_reject(&trial, i, ode, fmin(factor, INVERSE_SAFE)) != OK) return FAILED;
     }
-    const double before = i->error_old;
-    note_sign(s, i);
-    if (before > 0 && i->error_old > 0 && before != i->error_old) s->stages.narrowest = 0;
+    if (crossed) s->stages.narrowest = 0;
+    i->error_old = sign;
     trial_accept(&trial, i, y, factor);
     i->error = 0;
     return OK;
 }
 
-static void inverse_begin(Integrator *i, void *of) { note_sign(of, i); }
+static void inverse_begin(Integrator *i, void *of) { i->error_old = sign_there(of); }
 
 static Status inverse_prepare(Integrator *i, const Ode *ode) { return step_size_rate(i, ode); }
 
@@ -190,7 +220,7 @@ int inverse_dynamics_applies(const Solver *s) {
 
 SHARED_VALUE const Method inverse_dynamics = {
     .name = "inverse dynamics",
-    .scratch_arrays = 4, /* y; its rate; two of coordinates, or a rate */
+    .scratch_arrays = 5, /* y; its rate; three of coordinates, or a rate */
     .coarse = 1,
     .exact = 1,
     .step = inverse_step,

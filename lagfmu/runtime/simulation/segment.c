@@ -154,7 +154,8 @@ static Status check_fixed_step(Solver *s, const Integrator *i) {
  * where those of the step before do no longer.  Where nothing is integrated they may have been shown. */
 static Status accept(Solver *s, Integrator *i) {
     const int nq = s->system->nq, nv = s->system->nv;
-    if (i != &s->integrator || !i->fresh || s->system->m < 2) return OK;
+    const int stale = i->method->exact && s->state.now.approach.near; /* look() sees where the step begins */
+    if (i != &s->integrator || (!i->fresh && !stale) || s->system->m < 2) return OK;
     const double *y = i->y;
     const Instant at = segment_instant(s, i->t);
     const int shown = i->method->exact && i->t == s->state.now.t && s->shown == s->stepped.evaluations;
