@@ -360,7 +360,7 @@ def test_a_page_runs_the_top_as_the_binary_does(built: Built) -> None:
     if compiler is None or not compiler.cross:
         pytest.skip("no ziglang: pip install -e '.[native]'")
     wasm = pytest.importorskip("wasm", reason="pip install -e '.[test]'")
-    page = playable(built(held()))
+    page = playable(built(held(), whole=True))
     found = wasm.Module(page.module, page.facts).simulate(np.linspace(0, 1, 21))
     names = [n for n in found.dtype.names if n.startswith(("e", "w", "lambda", "der", "Q"))]
     run = simulate_fmu(built(held()), stop_time=1.0, output_interval=0.05, output=names)
