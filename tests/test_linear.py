@@ -625,7 +625,6 @@ def test_the_condition_of_an_arm_is_bounded_without_its_trace(library, seed):
     assert least < library.bench_condition(bench.handle) < 1e6
 
 
-@pytest.mark.thorough
 def redundant(seed, more, off=0.0):
     """M of two bodies in space, five rows, `more` that follow from them but for a part `off` of their own;
     some of the rows touch one body alone: not all multipliers are in doubt.  -> M, b, G, c and a basis."""
@@ -689,6 +688,7 @@ def test_rows_that_contradict_those_that_stand_for_them_are_refused(library):
         bench.answer(M, b, G, c + ~basis * np.abs(c).max(), basis=basis)
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif("LAGFMU_SANITIZE" in os.environ, reason="this is the run under the sanitizers")
 def test_clean_under_the_sanitizers():
     """The whole set once more with every memory access and every undefined operation watched."""
