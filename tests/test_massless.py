@@ -321,3 +321,31 @@ def test_a_file_may_have_links_without_mass_between_joints(tmp_path: Path) -> No
         0.1,
     )
     assert np.isfinite(run["angle.k"]).all()
+
+
+@TARGETS
+@pytest.mark.parametrize("mass", [0.0, 1e-3])
+@pytest.mark.parametrize("unit", [1.0, 1e-9])
+def test_a_beam_on_two_pins_bears_its_load_and_nobody_knows_along_it(
+    unit: float, mass: float, target: str
+) -> None:
+    """A load of 4 kg at a quarter of a beam: the nearer pin lifts three quarters of it; along the beam the
+    pins may push at each other by any force, whether the beam has mass or not, in any unit of mass."""
+    beam, load = Body("beam", mass * unit, mass * unit), Body("load", 4.0 * unit, 0.1 * unit)
+    model = mechanism(
+        "Beam",
+        plane="xy",
+        bodies=[beam, load],
+        joints=[
+            Revolute("A", ground.at((0, 0)), beam.at((-0.5, 0))),
+            Revolute("B", ground.at((1, 0)), beam.at((0.5, 0))),
+            Fixed("W", beam.at((-0.25, 0)), load.at((0, 0))),
+        ],
+        loads=[Gravity((0, -g))],
+    )
+    run = simulate(model, stop_time=0.1, step_size=0.1, target=target)
+    half = mass * g / 2
+    assert run["force.A.y"] / unit == pytest.approx(3 * g + half, rel=1e-12)
+    assert run["force.B.y"] / unit == pytest.approx(g + half, rel=1e-12)
+    assert [*run["unique.force.A.y"], *run["unique.force.B.y"]] == [1] * 4
+    assert [*run["unique.force.A.x"], *run["unique.force.B.x"]] == [0] * 4

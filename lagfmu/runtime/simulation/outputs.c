@@ -58,12 +58,17 @@ static void find_slopes(const System *s, Instant at, const Observed *o, double *
     }
 }
 
-/* length (m) of the rows in the metric of M, by its diagonal. */
+/* length (m) of the rows in the metric of M, by its diagonal; what has no mass counts as the lightest that is alike. */
 static void find_lengths(const Mechanism *b, double *weight, double *length) {
     const System *s = b->system;
     for (int i = 0; i < s->nv; i++) weight[i] = 0;
     for (int e = 0; e < s->masses; e++)
         if (s->mass_row[e] == s->mass_column[e] && b->M[e] > 0) weight[s->mass_row[e]] = 1 / sqrt(b->M[e]);
+    for (int i = 0; i < s->nv; i++) {
+        if (weight[i] > 0) continue;
+        const double alike = mechanism_largest_alike(s, s->speed_dimension[i], weight);
+        weight[i] = alike > 0 ? alike : 1;
+    }
     for (int k = 0; k < s->m; k++) length[k] = mechanism_row_size(b, k, weight);
 }
 
