@@ -349,3 +349,32 @@ def test_a_beam_on_two_pins_bears_its_load_and_nobody_knows_along_it(
     assert run["force.B.y"] / unit == pytest.approx(g + half, rel=1e-12)
     assert [*run["unique.force.A.y"], *run["unique.force.B.y"]] == [1] * 4
     assert [*run["unique.force.A.x"], *run["unique.force.B.x"]] == [0] * 4
+
+
+@TARGETS
+def test_in_small_units_of_mass_a_coupler_on_massless_cranks_swings_alike(target: str) -> None:
+    """Three parallel cranks of 0.4 m, two without mass: beside rows of 1 m a mass of 1e-9 kg is none, and yet
+    the motion is that of 1 kg, and each force the billionth part, also where redundant rows share it."""
+    runs = []
+    for unit in (1.0, 1e-9):
+        crank, coupler = Body("crank", unit, 0.02 * unit), Body("coupler", 3 * unit, 0.1 * unit)
+        bodies = [crank, *(Body(n, 0.0, 0.0) for n in ("left", "right"))]
+        joints = []
+        for k, body in enumerate(bodies):
+            joints.append(Revolute(f"A{k}", ground.at((0.5 * k, 0)), body.at((-0.2, 0))))
+            at = coupler.at((0.5 * k - 0.5, 0))
+            joints.append(Revolute(f"B{k}", body.at((0.2, 0)), at))
+        model = mechanism(
+            "Cranks",
+            plane="xy",
+            bodies=[*bodies, coupler],
+            joints=joints,
+            loads=[Gravity((0, -g))],
+            start={f"angle.A{k}": -1.0 for k in range(3)},
+        )
+        runs.append((unit, simulate(model, stop_time=0.3, step_size=0.1, target=target)))
+    (_, plain), (unit, small) = runs
+    assert small["angle.A0"] == pytest.approx(plain["angle.A0"], rel=1e-7)
+    for name in ("force.A0.x", "force.A1.y", "force.B2.norm"):
+        size = abs(plain[name]).max()
+        assert small[name] / unit == pytest.approx(plain[name], abs=1e-6 * size)

@@ -252,9 +252,13 @@ def _hides(L: Matrix, s: Vector, M: Matrix, G: Matrix, least: float) -> bool:
 
 
 def _equilibrated(M: Matrix, G: Matrix) -> tuple[Vector, Matrix]:
-    """The KKT matrix, and 1 / sqrt of the largest element of each of its rows."""
+    """The KKT matrix, and 1 / sqrt of the largest element of each of its rows, in a unit of mass in which
+    the largest element of M is then 1."""
     K = np.block([[M, G.T], [G, np.zeros((len(G), len(G)))]])
-    return 1 / np.sqrt(np.maximum(np.abs(K).max(axis=1), np.finfo(float).tiny)), K
+    d, n = 1 / np.sqrt(np.maximum(np.abs(K).max(axis=1), np.finfo(float).tiny)), len(M)
+    most = np.abs(M * d[:n] * d[:n, None]).max(initial=0.0)
+    unit = np.sqrt(most) if most > 0 else 1.0
+    return np.concatenate([d[:n] / unit, d[n:] * unit]), K
 
 
 def _least_norm(

@@ -46,7 +46,8 @@ static Whole whole_view(const Linear *l) {
     return w;
 }
 
-/* 1 / sqrt of the largest element of each row, 1 for a row of zeros. */
+/* 1 / sqrt of the largest element of each row, 1 for a row of zeros, in a unit of mass in which the largest element of M is
+ * then 1: lambda grows with it, and x stays. */
 static void scale_rows(const Linear *l, const Whole *w) {
     const System *s = l->system;
     for (int i = 0; i < w->cod.rows; i++) w->scale[i] = 0;
@@ -62,6 +63,11 @@ static void scale_rows(const Linear *l, const Whole *w) {
         w->scale[j] = fmax(w->scale[j], fabs(l->G[a]));
     }
     for (int i = 0; i < w->cod.rows; i++) w->scale[i] = w->scale[i] > 0 ? 1 / sqrt(w->scale[i]) : 1;
+    double most = 0;
+    for (int a = 0; a < s->masses; a++)
+        most = fmax(most, fabs(l->M[a]) * w->scale[s->mass_row[a]] * w->scale[s->mass_column[a]]);
+    const double unit = most > 0 ? sqrt(most) : 1;
+    for (int i = 0; i < w->cod.rows; i++) w->scale[i] *= i < s->nv ? 1 / unit : unit;
 }
 
 Status least_norm_factor(Linear *l) {
