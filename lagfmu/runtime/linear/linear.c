@@ -196,6 +196,12 @@ static Status solve_dense(Linear *l, const double *b, const double *c, double *x
     return OK;
 }
 
+/* By a rung above, where that of the factors does not settle. */
+static Status solve_above(Linear *l, const double *b, const double *c, double *x, double *lambda) {
+    if (check_right(l, b, c) != OK || climb(l) != OK) return FAILED;
+    return solve_dense(l, b, c, x, lambda);
+}
+
 Status linear_solve(Linear *l, const double *b, const double *c, double *x, double *lambda) {
     const double *forces = b;
     const int told = lambda != NULL, asked = told && b != NULL;
@@ -212,14 +218,12 @@ Status linear_solve(Linear *l, const double *b, const double *c, double *x, doub
     } else if (l->rung == RUNG_KEPT) {
         if (!DEPENDENT->solve_kept(l, b, c, x, lambda)) {
             none_shared(l);
-            if (check_right(l, b, c) != OK || climb(l) != OK) return FAILED;
-            status = solve_dense(l, b, c, x, lambda);
+            status = solve_above(l, b, c, x, lambda);
         }
     } else if (l->rung != RUNG_SCHUR) {
         status = solve_dense(l, b, c, x, lambda);
     } else if (!schur_solve(l, b, c, x, lambda)) {
-        if (check_right(l, b, c) != OK || climb(l) != OK) return FAILED;
-        status = solve_dense(l, b, c, x, lambda);
+        status = solve_above(l, b, c, x, lambda);
     } else if (l->stiffened && asked && l->dense != NULL && !stiffened_tells(l, forces, c, lambda)) {
         stiffened_undo(l);
         if (climb(l) != OK) return FAILED;

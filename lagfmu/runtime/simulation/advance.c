@@ -47,7 +47,8 @@ static const Method *method_of(const Solver *s) {
 }
 
 /* May the integrator stand ahead of the communication point?  Not with inputs, which may change; not
- * at a fixed step, which divides the communication step; not where that costs as much as to step to it; not where a slip may come to rest on the way. */
+ * at a fixed step, which divides the communication step; not where that costs as much as to step to it; not where a slip
+ * may come to rest on the way. */
 static int runs_ahead(const Solver *s) {
     if (s->system->inputs > 0 || method_of(s)->fixed || method_of(s)->exact) return 0;
     return s->system->frictions == 0 || !OPTIONAL.friction->turns(s);
